@@ -11,7 +11,7 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{ClearEmergency, QueryStatus, Reset, Resume, SetEmergency, Standby};
 use crate::node::now;
-use crate::service::State;
+use crate::service::{CLEAR_ALL, State};
 use crate::wire::Priority;
 
 /// How long a peer may take to reach a state …
@@ -235,6 +235,22 @@ impl Component {
     pub async fn clear_emergency(&self, peer: JausId) -> Result<(), ManageError> {
         let clear = ClearEmergency {
             emergency_code: 1.into(),
+        };
+        let over = |state: u8| state != State::Emergency as u8;
+        self.tell_until(Priority::SafetyCritical, peer, &clear, over)
+            .await
+            .map(drop)
+    }
+
+    /// Clears the emergencies of all clients, as [`clear_emergency`](Self::clear_emergency) clears
+    /// that of this component. A peer obeys a component of its own node, or a client over a secure
+    /// link whose key may do so. The peer's own emergency, as of its stop input, remains.
+    ///
+    /// # Errors
+    /// If the peer does not report its status.
+    pub async fn clear_all_emergencies(&self, peer: JausId) -> Result<(), ManageError> {
+        let clear = ClearEmergency {
+            emergency_code: CLEAR_ALL.into(),
         };
         let over = |state: u8| state != State::Emergency as u8;
         self.tell_until(Priority::SafetyCritical, peer, &clear, over)

@@ -94,11 +94,11 @@ mod undecoded;
 mod watch;
 
 pub use crate::service::{
-    AccessControl, Audience, Call, CannotSubscribe, Change, Condition, ControlLost, ControlRefused,
-    Directory, EventSettings, Handlers, Identification, Kind, LaterAnswer, Level, Liveness, Loss,
-    Management, NeedsControl, Offer, Outage, Patience, QueryOptions, Rejection, Retake, Scope,
-    Service, SessionLoss, SessionSettings, SessionState, Standing, State, SubscriptionEnd,
-    TargetState, Time, TimeOfDay, Timing, UndecodedFunctions, Validity, When,
+    AccessControl, Audience, CLEAR_ALL, Call, CannotSubscribe, Change, Condition, ControlLost,
+    ControlRefused, Directory, EventSettings, Handlers, Identification, Kind, LaterAnswer, Level,
+    Liveness, Loss, Management, NeedsControl, Offer, Outage, Patience, QueryOptions, Rejection,
+    Retake, Scope, Service, SessionLoss, SessionSettings, SessionState, Standing, State,
+    SubscriptionEnd, TargetState, Time, TimeOfDay, Timing, UndecodedFunctions, Validity, When,
 };
 pub use crate::wire::Priority;
 pub use builder::{AttachError, Builder};

@@ -73,7 +73,7 @@ pub use client::{
 };
 pub use clock_offset::{Age, ClockEstimator, ClockOffset, Drift, Exchange, MOST_SLEW};
 pub use context::Context;
-pub use control::{AccessControl, Condition, Management};
+pub use control::{AccessControl, CLEAR_ALL, Condition, Management};
 pub use directory::{
     ComponentEntry, Directory, Identification, Kind, Level, NodeEntry, Offer, SubsystemEntry,
 };

@@ -4,6 +4,7 @@ mod client;
 mod safeguard;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -28,6 +29,9 @@ use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{QueryAuthority, QueryControl, QueryStatus};
 use crate::wire::{Broadcast, Priority};
+
+/// The codes that AS5710 sets aside for queries.
+const QUERIES: RangeInclusive<u16> = 0x2000..=0x3FFF;
 
 /// A component without a network: its services, its directory, and its pending queries.
 pub struct Stack {
@@ -348,7 +352,10 @@ impl Stack {
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
         let news = std::mem::take(&mut self.news);
         let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
-        if discovered == Handled::No && self.handle_control(now, &message) == Handled::No {
+        // A client may put a command in place of the query: control does not obey it.
+        let is_query = code_of(query).is_some_and(|code| QUERIES.contains(&code));
+        let by_control = is_query && self.handle_control(now, &message) == Handled::Yes;
+        if discovered == Handled::No && !by_control {
             self.handle_by_services(now, &message);
         }
         let found = std::mem::replace(&mut self.news, news);

@@ -8,6 +8,10 @@ use super::failure::Failure;
 
 pub use jaus_view::{disturbs_terminal, quoted};
 
+/// Environment variable by which `jaus up` tells its parts that their output goes to a log, not to
+/// a terminal: they show no secrets in it.
+pub const OUTPUT_IS_LOG: &str = "JAUS_OUTPUT_IS_LOG";
+
 /// For example `no errors`, `1 error`, `2 errors`.
 pub fn counted(count: usize, what: &str) -> String {
     match count {

@@ -16,6 +16,8 @@ pub(super) enum Said<'a> {
         /// Number of the page at the station.
         page: u64,
         token_needed: bool,
+        /// Whether a page without the token may look, and stop vehicles.
+        watch: bool,
         operator: String,
         authority: u8,
         /// Whether the station has a map file.

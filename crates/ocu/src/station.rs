@@ -2,11 +2,12 @@
 
 use std::convert::Infallible;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 
 use tokio::net::TcpListener;
 
 use super::base_map::BaseMap;
-use super::server::{Admission, Gate, Server, Trail, UserGate};
+use super::server::{Admission, Devices, Gate, Server, Trail, UserGate};
 use super::session::Session;
 use super::tls::Tls;
 use super::token::Token;
@@ -26,7 +27,7 @@ use jaus_vehicle::parts::{Part, PartError, Slot};
 /// let node = Node::start(Config::new(42, 1))?;
 /// let slot = Slot::new(node.attach(1)?, node, Kind::OperatorControlUnit, "Operator");
 /// let station = Station { vehicles: vec![101], ..Station::default() }.open().await?;
-/// println!("the page is at {}", station.urls().join(" "));
+/// println!("the page is at {}", station.secret_urls().join(" "));
 /// station.run(slot).await?;
 /// # Ok(())
 /// # }
@@ -40,11 +41,17 @@ pub struct Station {
     pub authority: u8,
     /// Address of the page.
     pub listen: Listen,
-    /// The token an operator must show before the vehicle obeys. Without one, the loopback
-    /// interface needs none, and other addresses get a generated one.
+    /// The token an operator must show before the vehicle obeys. Without one, one is generated, and
+    /// kept in [`state`](Self::state).
     pub token: Option<Token>,
-    /// Whether reading also requires the token.
+    /// Whether looking and stopping also require the token.
     pub token_to_read: bool,
+    /// Whether no token is required: every user and program of this host may drive. It applies to
+    /// the loopback interface alone.
+    pub unprotected: bool,
+    /// The folder for the generated token and the known devices of users, which remain when the
+    /// station is restarted. Without it they do not.
+    pub state: Option<PathBuf>,
     /// The users of the page, who must log in to see anything. They replace the token.
     pub users: Option<UsersFile>,
     /// The certificate of the page. Without one it is served unencrypted.
@@ -84,14 +91,17 @@ impl Listen {
 }
 
 impl Default for Station {
-    /// All vehicles that are discovered, authority 200, on the loopback interface only.
+    /// All vehicles that are discovered, authority 200, on the loopback interface only, with a
+    /// generated token.
     fn default() -> Self {
         Self {
             vehicles: Vec::new(),
             authority: 200,
             listen: Listen::Loopback,
             token: None,
-            token_to_read: false,
+            token_to_read: true,
+            unprotected: false,
+            state: None,
             users: None,
             tls: None,
             audit: None,
@@ -105,17 +115,25 @@ impl Station {
     /// Opens the listening socket. Pages reach the session once the station runs.
     ///
     /// # Errors
-    /// If listening at the address fails.
+    /// If listening at the address fails, another address than loopback would be unprotected, or
+    /// there is no usable token.
     pub async fn open(mut self) -> Result<OpenStation, PartError> {
         let listener = listen(self.listen).await?;
         let address = listener
             .local_addr()
             .map_err(|error| PartError::Broken(error.to_string()))?;
-        let generates_token =
-            self.token.is_none() && self.users.is_none() && !address.ip().is_loopback();
+        if self.unprotected && !address.ip().is_loopback() {
+            return Err(PartError::Broken(format!(
+                "{address} is reached from other hosts: it requires a token or users"
+            )));
+        }
+        let generates_token = self.token.is_none() && self.users.is_none() && !self.unprotected;
         if generates_token {
-            let generated = Token::generate();
-            self.token = Some(generated.map_err(|error| PartError::Broken(error.to_string()))?);
+            let token = match &self.state {
+                Some(folder) => Token::keep(&folder.join(TOKEN_FILE)),
+                None => Token::generate(),
+            };
+            self.token = Some(token.map_err(|error| PartError::Broken(error.to_string()))?);
         }
         Ok(OpenStation {
             station: self,
@@ -126,11 +144,14 @@ impl Station {
     }
 }
 
+/// Name of the file with the generated token.
+const TOKEN_FILE: &str = "page.token";
+
 /// A station with an open listening socket.
 #[derive(Debug)]
 pub struct OpenStation {
     station: Station,
-    /// Whether the token was generated at this start.
+    /// Whether the token was generated, at this start or at an earlier one.
     generates_token: bool,
     listener: TcpListener,
     address: SocketAddr,
@@ -149,8 +170,8 @@ impl OpenStation {
         self.urls_with("")
     }
 
-    /// URLs of the page with the token that was generated at this start; none if the token came from
-    /// the caller. They are for the user who starts the station, not for a log.
+    /// URLs of the page with the generated token; none if the token came from the caller. They are
+    /// for the user who starts the station, not for a log.
     #[must_use]
     pub fn secret_urls(&self) -> Vec<String> {
         match &self.station.token {
@@ -159,6 +180,14 @@ impl OpenStation {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// The file with the generated token, if it is kept.
+    #[must_use]
+    pub fn token_file(&self) -> Option<PathBuf> {
+        let folder = self.station.state.as_ref();
+        let file = folder.map(|it| it.join(TOKEN_FILE));
+        file.filter(|_| self.generates_token)
     }
 
     fn urls_with(&self, token: &str) -> Vec<String> {
@@ -215,18 +244,26 @@ impl Part for OpenStation {
         let gate = match (station.users, station.token) {
             (Some(users), _) => {
                 let is_secure = station.tls.is_some();
-                Gate::Users(UserGate::new(
+                let file =
+                    |folder: PathBuf| folder.join(format!("page-{}.devices", address.port()));
+                Gate::Users(Box::new(UserGate::new(
                     users,
+                    Devices::load(station.state.map(file)),
                     address.port(),
                     is_secure,
                     trail.clone(),
-                ))
+                )))
             }
             (None, Some(token)) => Gate::Token {
                 token,
                 to_read: station.token_to_read,
             },
-            (None, None) => Gate::Open,
+            (None, None) => {
+                tracing::warn!(
+                    "the page is unprotected: every user and program of this host may drive vehicles"
+                );
+                Gate::Open
+            }
         };
         let admission = Admission {
             operator: component.id(),

@@ -1,10 +1,12 @@
 //! The secret that an operator shows before the vehicle obeys.
 
 use std::fmt;
+use std::fs;
 use std::hint::black_box;
+use std::io::{self, Write as _};
 use std::path::Path;
 
-/// Access token of an operator: from a file, or generated for one run.
+/// Access token of an operator: from a file, or generated.
 ///
 /// ```
 /// use jaus_ocu::Token;
@@ -25,7 +27,21 @@ pub enum TokenError {
         /// The file.
         file: String,
         /// The cause.
-        source: std::io::Error,
+        source: io::Error,
+    },
+    /// The file cannot be written.
+    #[error("cannot write the token file {file}: {source}")]
+    Unwritable {
+        /// The file.
+        file: String,
+        /// The cause.
+        source: io::Error,
+    },
+    /// Other users of the host can read the file.
+    #[error("the token file {file} can be read by other users of this host: remove it")]
+    Readable {
+        /// The file.
+        file: String,
     },
     /// The content is unsuitable as a token.
     #[error(
@@ -60,7 +76,7 @@ impl Token {
     /// other than letters, digits and `-._~`.
     pub fn read(file: &Path) -> Result<Self, TokenError> {
         let name = || file.display().to_string();
-        let text = std::fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
+        let text = fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
             file: name(),
             source,
         })?;
@@ -78,6 +94,33 @@ impl Token {
         let suits =
             (Self::SHORTEST..=Self::LONGEST).contains(&text.len()) && text.bytes().all(plain);
         suits.then(|| Self(text.to_owned()))
+    }
+
+    /// The token that a file holds for its owner alone. Without the file, generates a token and
+    /// writes it there; if another process does so at the same time, both get the same one.
+    ///
+    /// # Errors
+    /// If the file cannot be read or written, others can read it, or it holds no token.
+    pub fn keep(file: &Path) -> Result<Self, TokenError> {
+        let failed = |source| TokenError::Unwritable {
+            file: file.display().to_string(),
+            source,
+        };
+        if !file.try_exists().map_err(failed)? {
+            let token = Self::generate()?;
+            let draft = file.with_extension(format!("new-{}", Self::generate()?.0));
+            let written = write_for_owner(&draft, token.reveal());
+            // Unlike a renamed file, a link replaces none.
+            let linked = written.and_then(|()| match fs::hard_link(&draft, file) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+                other => other,
+            });
+            // A draft that stays does no harm.
+            let _ = fs::remove_file(&draft);
+            linked.map_err(failed)?;
+        }
+        check_mode(file)?;
+        Self::read(file)
     }
 
     /// Generates a token of 32 hexadecimal digits.
@@ -106,6 +149,38 @@ impl Token {
     pub fn reveal(&self) -> &str {
         &self.0
     }
+}
+
+/// Writes a file that nobody else can read.
+fn write_for_owner(file: &Path, text: &str) -> io::Result<()> {
+    let mut options = fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(file)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()
+}
+
+/// Refuses a file that other users of the host can read: they may know its token already.
+#[cfg(unix)]
+fn check_mode(file: &Path) -> Result<(), TokenError> {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let name = || file.display().to_string();
+    let metadata = fs::metadata(file).map_err(|source| TokenError::Unreadable {
+        file: name(),
+        source,
+    })?;
+    match metadata.permissions().mode() & 0o077 {
+        0 => Ok(()),
+        _ => Err(TokenError::Readable { file: name() }),
+    }
+}
+
+#[cfg(not(unix))]
+fn check_mode(_: &Path) -> Result<(), TokenError> {
+    Ok(())
 }
 
 impl fmt::Debug for Token {
@@ -144,6 +219,32 @@ mod tests {
             assert!(Token::new(text).is_none(), "{text}");
         }
         assert!(Token::new(&"a".repeat(257)).is_none());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_kept_token_is_the_same_at_the_next_start_and_for_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("page.token");
+        let both = [0, 1].map(|_| {
+            let file = file.clone();
+            std::thread::spawn(move || Token::keep(&file).unwrap())
+        });
+        let [one, other] = both.map(|it| it.join().unwrap());
+        assert!(one.is(other.reveal()) && one.is(Token::keep(&file).unwrap().reveal()));
+        let mode = |mode| fs::set_permissions(&file, fs::Permissions::from_mode(mode)).unwrap();
+        assert_eq!(
+            fs::metadata(&file).unwrap().permissions().mode() & 0o777,
+            0o600
+        );
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        mode(0o640);
+        assert!(matches!(
+            Token::keep(&file),
+            Err(TokenError::Readable { .. })
+        ));
     }
 
     #[test]

@@ -5,7 +5,8 @@
 //! | `observe` | query, subscribe, report, and set an emergency; every trusted key may |
 //! | `command` | send commands as well |
 //! | `control=127` | send commands, and take control of components with an authority up to 127 |
-//! | `clear-emergency` | clear emergencies |
+//! | `clear-emergency` | clear emergencies that it has set, and as the client in control those of clients that are gone |
+//! | `clear-emergency=any` | clear emergencies, also those of other clients |
 //! | `configure` | shut components down, reset them, set their time |
 //! | `with=101.255.255,102.1.255` | exchange messages with these ids alone |
 //! | `only=PrimitiveDriver,D103h` | of all commands, send these alone |
@@ -15,7 +16,8 @@
 //! inside a request for an event, but not to those inside a list or a mission. Control, emergencies
 //! and configuration have words of their own: `only` does not concern them.
 //!
-//! Everybody may set an emergency, because a stop must never fail for lack of a right.
+//! Who may observe may set an emergency, because a stop must not fail for lack of a right, unless
+//! `except=SetEmergency` takes it away.
 
 mod permission;
 mod selection;
@@ -26,9 +28,10 @@ use std::str::FromStr;
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message as _;
-use jaus::messages::core::{ConfirmControl, confirm_control::ResponseCode};
+use jaus::messages::core::{ConfirmControl, SetEmergency, confirm_control::ResponseCode};
 use jaus::wire::{DataControl, EncodeError, Frame, judp};
 
+pub(crate) use permission::clears_all;
 use permission::{Carried, Permission};
 pub use selection::{Selection, UnknownName};
 
@@ -42,6 +45,8 @@ pub struct Rules {
     pub control: Option<u8>,
     /// Whether it may clear emergencies.
     pub clear_emergency: bool,
+    /// Whether it may clear the emergencies of other clients, too.
+    pub clear_any_emergency: bool,
     /// Whether it may shut components down, reset them, and set their time.
     pub configure: bool,
     /// The only ids with which it may exchange messages, with wildcards; all if empty.
@@ -76,6 +81,11 @@ pub enum Refusal {
     /// An emergency is cleared without [`Rules::clear_emergency`].
     #[error("its key may not clear emergencies: add `clear-emergency` to its line")]
     ClearEmergency,
+    /// The emergencies of all clients are cleared without [`Rules::clear_any_emergency`].
+    #[error(
+        "its key may not clear the emergencies of others: add `clear-emergency=any` to its line"
+    )]
+    ClearAnyEmergency,
     /// A component is configured without [`Rules::configure`].
     #[error("its key may not shut down, reset or set the time: add `configure` to its line")]
     Configure,
@@ -101,7 +111,17 @@ impl Rules {
             command: true,
             control: Some(u8::MAX),
             clear_emergency: true,
+            clear_any_emergency: true,
             configure: true,
+            ..Self::default()
+        }
+    }
+
+    /// To observe and no more: not even to set an emergency, for clients that nobody has named.
+    #[must_use]
+    pub fn watch() -> Self {
+        Self {
+            except: Selection::of(SetEmergency::NAME, SetEmergency::CODE),
             ..Self::default()
         }
     }
@@ -158,6 +178,7 @@ impl Rules {
             Permission::Control { authority } => return self.check_authority(authority),
             Permission::Command => (self.command || self.control.is_some(), Refusal::Command),
             Permission::ClearEmergency => (self.clear_emergency, Refusal::ClearEmergency),
+            Permission::ClearAnyEmergency => (self.clear_any_emergency, Refusal::ClearAnyEmergency),
             Permission::Configure => (self.configure, Refusal::Configure),
         };
         if allowed { Ok(()) } else { Err(refusal) }
@@ -237,8 +258,8 @@ pub fn denial_of_control(request: &Frame) -> Result<Bytes, EncodeError> {
 pub enum RuleError {
     /// The word is unknown.
     #[error(
-        "`{0}` is not a rule: write observe, command, control=AUTHORITY, clear-emergency, configure, \
-         with=IDS, only=NAMES or except=NAMES"
+        "`{0}` is not a rule: write observe, command, control=AUTHORITY, clear-emergency, \
+         clear-emergency=any, configure, with=IDS, only=NAMES or except=NAMES"
     )]
     Word(String),
     /// The authority is malformed.
@@ -273,6 +294,9 @@ impl Rules {
                 ("observe", false) => {}
                 ("command", false) => rules.command = true,
                 ("clear-emergency", false) => rules.clear_emergency = true,
+                ("clear-emergency", true) if value == "any" => {
+                    (rules.clear_emergency, rules.clear_any_emergency) = (true, true);
+                }
                 ("configure", false) => rules.configure = true,
                 ("with" | "only" | "except", true) if value.is_empty() => {
                     return Err(RuleError::Empty(name.to_owned()));
@@ -309,7 +333,11 @@ impl fmt::Display for Rules {
         let mut words = Vec::new();
         let flags = [
             (self.command, "command"),
-            (self.clear_emergency, "clear-emergency"),
+            (
+                self.clear_emergency && !self.clear_any_emergency,
+                "clear-emergency",
+            ),
+            (self.clear_any_emergency, "clear-emergency=any"),
             (self.configure, "configure"),
         ];
         words.extend(

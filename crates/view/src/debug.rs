@@ -6,11 +6,17 @@
 //! | `/tree` | the discovered components, as JSON |
 //!
 //! It is read-only: input from viewers is ignored. A slow viewer loses messages and receives their
-//! number in `{"lost":N}`; the traffic never waits. Requests from pages of other sites are refused,
-//! because any web page can make a browser connect to this host.
+//! number in `{"lost":N}`; the traffic never waits.
+//!
+//! Its usual address is a Unix socket that other users of the host cannot reach. A TCP port is open
+//! to all of them; requests from pages of other sites are refused, because any web page can make a
+//! browser connect to this host.
 
 use std::convert::Infallible;
-use std::net::SocketAddr;
+use std::fmt;
+use std::net::{AddrParseError, SocketAddr};
+use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -19,16 +25,22 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+#[cfg(unix)]
+use axum::serve::Listener;
 use axum::{Json, Router};
 use futures_util::stream::{SplitSink, SplitStream, select_all, unfold};
 use futures_util::{SinkExt, StreamExt};
 use tokio::net::TcpListener;
+#[cfg(unix)]
+use tokio::net::UnixStream;
 use tokio::sync::Semaphore;
 
 use super::dictionary::Dictionary;
 use super::stream::{Filter, Links, MessageStream};
 use super::tree;
 use jaus::component::Component;
+#[cfg(unix)]
+use jaus::link::local::OwnerSocket;
 use jaus::node::{Node, Tap, Tapped};
 
 /// Limit of simultaneous viewers.
@@ -39,6 +51,9 @@ const WAITING: usize = 1024;
 const TOGETHER: usize = 64;
 /// The longest frame accepted from a viewer, whose input is ignored.
 const LONGEST: usize = 1024;
+/// Pause after a viewer could not connect.
+#[cfg(unix)]
+const PAUSE: Duration = Duration::from_millis(100);
 /// How long a viewer may read nothing before it is disconnected.
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -47,10 +62,10 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// ```no_run
 /// # use jaus::component::Component;
 /// # use jaus::node::Node;
-/// # use jaus_view::{Dictionary, debug::DebugView};
+/// # use jaus_view::{Dictionary, debug::{DebugAddress, DebugView}};
 /// # async fn example(node: Node, component: Component) -> std::io::Result<()> {
 /// let view = DebugView::new([node], component, Dictionary::new());
-/// let listener = tokio::net::TcpListener::bind("127.0.0.1:8794").await?;
+/// let listener = DebugAddress::usual(0).listen().await?;
 /// view.serve(listener).await?;
 /// # Ok(())
 /// # }
@@ -96,8 +111,12 @@ impl DebugView {
     ///
     /// # Errors
     /// The error of the operating system.
-    pub async fn serve(self, listener: TcpListener) -> std::io::Result<Infallible> {
-        axum::serve(listener, self.router()).await?;
+    pub async fn serve(self, listener: impl Into<DebugListener>) -> std::io::Result<Infallible> {
+        match listener.into() {
+            DebugListener::Tcp(listener) => axum::serve(listener, self.router()).await?,
+            #[cfg(unix)]
+            DebugListener::Unix(socket) => axum::serve(OfOwner(socket), self.router()).await?,
+        }
         Err(std::io::ErrorKind::ConnectionAborted.into())
     }
 }
@@ -221,12 +240,128 @@ fn check_site(headers: &HeaderMap) -> Result<(), (StatusCode, &'static str)> {
     }
 }
 
-/// Opens the address of a debug view.
-///
-/// # Errors
-/// What the operating system says.
-pub async fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
-    TcpListener::bind(address).await
+/// Where a debug view is served: at the path of a Unix socket for the programs of one user, or at a
+/// TCP port, which is open to everyone who reaches it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DebugAddress {
+    /// A Unix socket.
+    Path(PathBuf),
+    /// A TCP port.
+    Tcp(SocketAddr),
+}
+
+impl DebugAddress {
+    /// The usual address of this user: of the first view (0) or of further ones. Without Unix
+    /// sockets it is a port of loopback from 8794.
+    #[must_use]
+    pub fn usual(number: u16) -> Self {
+        usual_address(number)
+    }
+
+    /// Opens the address.
+    ///
+    /// # Errors
+    /// What the operating system says; or others could replace the socket.
+    pub async fn listen(&self) -> std::io::Result<DebugListener> {
+        match self {
+            #[cfg(unix)]
+            Self::Path(path) => OwnerSocket::listen(path)
+                .map(DebugListener::Unix)
+                .map_err(std::io::Error::other),
+            #[cfg(not(unix))]
+            Self::Path(_) => Err(std::io::ErrorKind::Unsupported.into()),
+            Self::Tcp(address) => TcpListener::bind(address).await.map(DebugListener::Tcp),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn usual_address(number: u16) -> DebugAddress {
+    let name = match number {
+        0 => "debug.sock".to_owned(),
+        _ => format!("debug-{number}.sock"),
+    };
+    DebugAddress::Path(OwnerSocket::default_path(&name))
+}
+
+#[cfg(not(unix))]
+fn usual_address(number: u16) -> DebugAddress {
+    DebugAddress::Tcp((std::net::Ipv4Addr::LOCALHOST, 8794 + number).into())
+}
+
+impl FromStr for DebugAddress {
+    type Err = AddrParseError;
+
+    fn from_str(text: &str) -> Result<Self, AddrParseError> {
+        if text.contains('/') {
+            return Ok(Self::Path(text.into()));
+        }
+        text.parse().map(Self::Tcp)
+    }
+}
+
+impl fmt::Display for DebugAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Path(path) => path.display().fmt(f),
+            Self::Tcp(address) => address.fmt(f),
+        }
+    }
+}
+
+/// The open address of a debug view.
+#[derive(Debug)]
+pub enum DebugListener {
+    /// A Unix socket.
+    #[cfg(unix)]
+    Unix(OwnerSocket),
+    /// A TCP port.
+    Tcp(TcpListener),
+}
+
+impl DebugListener {
+    /// Its address.
+    #[must_use]
+    pub fn address(&self) -> Option<DebugAddress> {
+        match self {
+            #[cfg(unix)]
+            Self::Unix(socket) => Some(DebugAddress::Path(socket.path().to_owned())),
+            Self::Tcp(listener) => listener.local_addr().ok().map(DebugAddress::Tcp),
+        }
+    }
+}
+
+impl From<TcpListener> for DebugListener {
+    fn from(listener: TcpListener) -> Self {
+        Self::Tcp(listener)
+    }
+}
+
+/// Serves the owner of a socket alone.
+#[cfg(unix)]
+struct OfOwner(OwnerSocket);
+
+#[cfg(unix)]
+impl Listener for OfOwner {
+    type Io = UnixStream;
+    type Addr = ();
+
+    async fn accept(&mut self) -> (UnixStream, ()) {
+        loop {
+            match self.0.accept().await {
+                Ok(stream) => return (stream, ()),
+                Err(error) => {
+                    tracing::warn!("debug view: {error}");
+                    #[expect(clippy::disallowed_methods, reason = "viewers run in real time")]
+                    tokio::time::sleep(PAUSE).await;
+                }
+            }
+        }
+    }
+
+    fn local_addr(&self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -240,6 +375,25 @@ mod tests {
             headers.insert(header::ORIGIN, origin.parse().unwrap());
         }
         check_site(&headers).is_ok()
+    }
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_socket_is_for_its_owner_alone_and_gone_with_its_view() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = std::env::temp_dir().join(format!("jaus-debug-{}", std::process::id()));
+        std::fs::create_dir(&folder).unwrap();
+        let path = folder.join("debug.sock");
+        let address: DebugAddress = path.to_str().unwrap().parse().unwrap();
+        let listener = address.listen().await.unwrap();
+        assert_eq!(listener.address(), Some(address.clone()));
+        let mode = std::fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        assert!(address.listen().await.is_err(), "it is in use");
+        drop(listener);
+        assert!(!path.exists());
+        std::fs::remove_dir(&folder).unwrap();
     }
 
     #[test]

@@ -69,11 +69,11 @@ pub struct Acceptance(Vec<Grant>);
 pub(crate) const MOST_GRANTS: usize = 256;
 
 impl Default for Acceptance {
-    /// All ids, which may observe.
+    /// All ids, which may observe, but set no emergency: nobody has named them.
     fn default() -> Self {
         Self(vec![Grant {
             ids: JausId::EVERYONE,
-            rules: Rules::default(),
+            rules: Rules::watch(),
         }])
     }
 }

@@ -541,6 +541,7 @@ fn reason(refusal: Refusal) -> String {
         Refusal::Command => remedy("`command` or `control=AUTHORITY`"),
         Refusal::Control => remedy("`control=AUTHORITY`"),
         Refusal::ClearEmergency => remedy("`clear-emergency`"),
+        Refusal::ClearAnyEmergency => remedy("`clear-emergency=any`"),
         Refusal::Configure => remedy("`configure`"),
         Refusal::Authority { asked, most } => {
             format!("authority {asked}, but its --accept allows at most {most}")

@@ -19,6 +19,7 @@
 //! | `connection` | the two halves of a connection, the same on both sides |
 //! | `stream` | the two kinds of stream, and the process at the other end |
 //! | `address` | the address at which the node listens |
+//! | `owner_socket` | the same permissions for sockets of other servers |
 //! | `listener`, `unix_socket` | the node's side: directory and socket with their permissions |
 //!
 //! [`node`](crate::node) reads and answers the records.
@@ -28,6 +29,8 @@ mod assembler;
 mod connection;
 mod error;
 mod listener;
+#[cfg(unix)]
+mod owner_socket;
 pub mod record;
 mod stream;
 #[cfg(unix)]
@@ -38,5 +41,7 @@ pub use assembler::Assembler;
 pub(crate) use connection::{Reader, Writer};
 pub use error::Error;
 pub(crate) use listener::Listener;
+#[cfg(unix)]
+pub use owner_socket::OwnerSocket;
 pub use stream::Process;
 pub(crate) use stream::{Stream, connect};

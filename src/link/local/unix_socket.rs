@@ -43,6 +43,21 @@ pub(super) async fn accept(listener: &UnixListener, path: &Path) -> Result<Strea
     Ok(stream)
 }
 
+/// Refuses a process of another user.
+pub(super) fn accept_owner(stream: &UnixStream, path: &Path, own: u32) -> Result<(), Error> {
+    let peer = stream
+        .peer_cred()
+        .map_err(Error::io("accepting a connection"))?;
+    if may_attach(peer.uid(), own) {
+        return Ok(());
+    }
+    Err(Error::Foreign {
+        place: path.display().to_string(),
+        uid: peer.uid(),
+        own,
+    })
+}
+
 /// The process id of the node that serves a connected socket.
 fn server_of(socket: Socket) -> Option<u32> {
     let stream = UnixStream::from_std(socket.into()).ok()?;

@@ -148,13 +148,15 @@ impl Control {
             })
     }
 
-    /// Whether control can be requested at all. In an emergency only if all clients that set one
-    /// are dead, so that a new client in control can clear it.
+    /// Whether control can be requested at all. In an emergency only if no client that is known to
+    /// have set one is alive, so that a new client in control can clear those of dead clients, and
+    /// those that the table did not hold.
     fn is_available(&self, is_alive: impl Fn(JausId) -> bool) -> bool {
         match self.standing.state {
             State::Ready | State::Standby => true,
             State::Emergency => {
-                !self.emergencies.is_empty() && !self.emergencies.iter().any(|&it| is_alive(it))
+                let has_setter = !self.emergencies.is_empty() || self.more_emergencies;
+                has_setter && !self.emergencies.iter().any(|&it| is_alive(it))
             }
             State::Initialize | State::Shutdown | State::Failure => false,
         }

@@ -3,23 +3,28 @@
 use super::{Condition, Control};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::endpoint::Received;
+use crate::endpoint::{Received, Remote};
 use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Shutdown, Standby,
     report_status,
 };
-use crate::service::{Handled, Outbox, State};
+use crate::service::{Handled, Outbox, State, read};
 
 /// Limit of remembered clients with an emergency. The next one replaces one that shows no life. If
 /// there is none, it is only noted, and the client in control clears it.
 pub(super) const MOST_EMERGENCIES: usize = 1024;
 
+/// The code of Clear Emergency (0007h) by which a client clears the emergencies of all clients. The
+/// standard reserves it.
+pub const CLEAR_ALL: u16 = 0xFFFF;
+
 impl Condition {
     const fn leads_from(self, state: State) -> State {
         match (self, state) {
             (Self::Initialized, State::Initialize | State::Failure) => State::Standby,
-            (Self::Failed, State::Shutdown) | (Self::Initialized | Self::Safe, _) => state,
+            (Self::Failed, State::Shutdown) => state,
             (Self::Failed, _) => State::Failure,
+            (Self::Initialized | Self::Stopped | Self::StopReleased | Self::Safe, _) => state,
         }
     }
 }
@@ -41,6 +46,7 @@ impl Control {
             Shutdown::CODE => self.shut_down(client, out),
             // The emergency code does not matter: stopping is always right.
             SetEmergency::CODE => self.set_emergency(client, is_alive),
+            ClearEmergency::CODE if clears_all(message) => self.clear_all(client, out),
             ClearEmergency::CODE => self.clear_emergency(client, is_alive, out),
             _ => return Handled::No,
         }
@@ -52,11 +58,21 @@ impl Control {
         if self.management.is_none() {
             return;
         }
-        if condition == Condition::Safe && self.standing.state == State::Emergency {
-            tracing::warn!(id = %out.source(), "emergency cleared by the vehicle");
-            self.emergencies.clear();
-            self.more_emergencies = false;
-            self.end_emergency(out);
+        match condition {
+            Condition::Safe if self.standing.state == State::Emergency => {
+                tracing::warn!(id = %out.source(), "emergency cleared by the vehicle");
+                self.is_stopped = false;
+                self.forget_emergencies();
+                self.end_emergency(out);
+            }
+            Condition::Stopped => {
+                self.is_stopped = true;
+                self.begin_emergency();
+            }
+            Condition::StopReleased if std::mem::take(&mut self.is_stopped) => {
+                self.end_emergency(out);
+            }
+            _ => {}
         }
         // During an emergency, other reports take effect afterwards.
         let state = match &mut self.standing.state {
@@ -122,6 +138,10 @@ impl Control {
         if self.emergencies.len() < MOST_EMERGENCIES && self.emergencies.insert(client) {
             tracing::warn!(%client, "emergency");
         }
+        self.begin_emergency();
+    }
+
+    fn begin_emergency(&mut self) {
         let state = self.standing.state;
         if state != State::Emergency {
             self.resting = match state {
@@ -130,6 +150,21 @@ impl Control {
             };
             self.standing.state = State::Emergency;
         }
+    }
+
+    /// Clears the emergencies of all clients, but not the component's own.
+    fn clear_all(&mut self, client: JausId, out: &mut Outbox) {
+        if self.standing.state == State::Emergency {
+            let setters = &self.emergencies;
+            tracing::warn!(%client, ?setters, "the emergencies of all clients are cleared");
+            self.forget_emergencies();
+            self.end_emergency(out);
+        }
+    }
+
+    fn forget_emergencies(&mut self) {
+        self.emergencies.clear();
+        self.more_emergencies = false;
     }
 
     /// Clears the emergency of a client. The client in control also clears those of dead clients.
@@ -151,20 +186,32 @@ impl Control {
             });
             cleared |= self.emergencies.is_empty() && std::mem::take(&mut self.more_emergencies);
         }
-        if cleared && self.emergencies.is_empty() && !self.more_emergencies {
-            tracing::warn!(%client, "the last emergency is cleared");
+        if cleared {
             self.end_emergency(out);
         }
     }
 
-    /// Control may have been granted only to clear the emergency. It ends if the next state does
-    /// not allow control.
+    /// Leaves the emergency once nobody has one. Control may have been granted only to clear it: it
+    /// ends if the next state does not allow control.
     fn end_emergency(&mut self, out: &mut Outbox) {
-        if self.standing.state == State::Emergency {
+        let is_over = self.emergencies.is_empty() && !self.more_emergencies && !self.is_stopped;
+        if is_over && self.standing.state == State::Emergency {
+            tracing::warn!(id = %out.source(), "the last emergency is cleared");
             if !matches!(self.resting, State::Standby | State::Ready) {
                 self.drop_controller(out);
             }
             self.standing.state = self.resting;
         }
     }
+}
+
+/// Whether a Clear Emergency is for those of all clients, and from one who may clear them: a
+/// component of this node, or a session of a link that has checked the sender's right.
+fn clears_all(message: &Received) -> bool {
+    let is_checked = match message.path {
+        None => true,
+        Some(path) => matches!(path.peer, Remote::Session(_)),
+    };
+    let asked = read::<ClearEmergency>(message).map(|it| it.emergency_code.0);
+    is_checked && asked == Some(CLEAR_ALL)
 }

@@ -29,11 +29,18 @@
 //! * **An emergency** ends when each client that set one has cleared it, as in the standard. A dead
 //!   client cannot, nor one that never existed because its id was forged. So the client in control
 //!   may also clear emergencies whose setter has shown no life for 4 s. If no client is in control,
-//!   control can be requested for that purpose. The application on the vehicle can end all
-//!   emergencies ([`Condition::Safe`]).
+//!   control can be requested for that purpose. The vehicle's own emergency
+//!   ([`Condition::Stopped`]), as of a stop input, is one more, which no client clears. The
+//!   application on the vehicle can end all emergencies ([`Condition::Safe`]).
+//! * **Clear Emergency with the code [`CLEAR_ALL`]**, which the standard reserves, ends those of
+//!   other clients as well. Only a component of the own node may send it, or a client over a link
+//!   that authenticates its ids and has a rule for this code. From others it clears as any code.
 
 mod access;
 mod management;
+
+pub use management::CLEAR_ALL;
+
 #[cfg(test)]
 mod tests;
 
@@ -138,6 +145,12 @@ pub enum Condition {
     Initialized,
     /// Something is broken. Has no effect during shutdown.
     Failed,
+    /// The component stops by itself, as by a stop input: an emergency begins that no client can
+    /// clear.
+    Stopped,
+    /// The reason of [`Stopped`](Self::Stopped) is over: its emergency ends. Those that clients have
+    /// set remain.
+    StopReleased,
     /// The person responsible for the component on site has checked it. All emergencies end,
     /// including those of clients that are gone and will not clear theirs.
     Safe,
@@ -155,6 +168,8 @@ pub(super) struct Control {
     emergencies: BTreeSet<JausId>,
     /// Whether more emergencies were set than the table holds.
     more_emergencies: bool,
+    /// Whether the component has stopped by itself.
+    is_stopped: bool,
     /// The state to return to after an emergency.
     resting: State,
 }

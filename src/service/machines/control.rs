@@ -333,7 +333,7 @@ impl Pair {
         let _ = match condition {
             Condition::Initialized => self.step(Event::Initialized),
             Condition::Failed => self.step(Event::Failure),
-            Condition::Safe => return,
+            Condition::Stopped | Condition::StopReleased | Condition::Safe => return,
         };
     }
 

@@ -56,7 +56,9 @@ impl Stack {
                 self.faults.of_application = true;
                 self.control.handle_condition(condition, &mut self.out);
             }
-            Condition::Safe => self.control.handle_condition(condition, &mut self.out),
+            Condition::Stopped | Condition::StopReleased | Condition::Safe => {
+                self.control.handle_condition(condition, &mut self.out);
+            }
         }
         self.collect(now);
     }

@@ -1,6 +1,5 @@
 //! `jaus-communicator`: the vehicle's node, between its boards, the operator's network and a radio.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -10,8 +9,8 @@ use jaus::address::JausId;
 use jaus::link::serial;
 use jaus::node::{Config, Local, units};
 use jaus_cli::{self, Failure, Ready};
-use jaus_vehicle::parts::Part;
-use jaus_vehicle::parts::{Communicator, DEBUG_ADDRESS};
+use jaus_vehicle::parts::{Communicator, Part};
+use jaus_view::debug::DebugAddress;
 use jaus_view::{JournalFormat, JournalSettings};
 
 #[derive(Args)]
@@ -30,8 +29,9 @@ struct Flags {
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
     local: Option<Local>,
 
-    /// Where to serve the debug view for `jaus watch` and others, or off [default: 127.0.0.1:8794
-    /// if free]
+    /// Where to serve the debug view for `jaus watch` and others: the path of a socket for this user
+    /// alone, or off; or ADDRESS:PORT, where everyone who reaches it reads all messages [default:
+    /// the socket `debug.sock` beside that of --local]
     #[arg(long, value_name = "ADDRESS")]
     debug: Option<Debug>,
 
@@ -53,10 +53,10 @@ struct Flags {
 }
 
 /// Address of the debug view.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 enum Debug {
     Off,
-    At(SocketAddr),
+    At(DebugAddress),
 }
 
 impl std::str::FromStr for Debug {
@@ -66,7 +66,9 @@ impl std::str::FromStr for Debug {
         match text {
             "off" => Ok(Self::Off),
             _ => text.parse().map(Self::At).map_err(|_| {
-                "write an address with its port, such as 127.0.0.1:8794, or off".to_owned()
+                "write the path of a socket such as ./debug.sock, an address with its port such as \
+                 127.0.0.1:8794, or off"
+                    .to_owned()
             }),
         }
     }
@@ -128,12 +130,12 @@ impl Ready for Flags {
             settings.limited_to(self.log_limit as u64)
         });
         Ok(Communicator {
+            debug_is_needed: self.debug.is_some(),
             debug: match self.debug {
-                None => Some(DEBUG_ADDRESS),
+                None => Some(DebugAddress::usual(0)),
                 Some(Debug::At(address)) => Some(address),
                 Some(Debug::Off) => None,
             },
-            debug_is_needed: self.debug.is_some(),
             log,
             ..Communicator::default()
         })

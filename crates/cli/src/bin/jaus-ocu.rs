@@ -1,6 +1,7 @@
 //! `jaus-ocu`: the operator's station and its page.
 
 use std::convert::Infallible;
+use std::env;
 use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -10,12 +11,13 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus_audit::{AuditLog, Limits};
+use jaus_cli::folders::{make_folder_of, service_folder};
 #[cfg(feature = "https")]
 use jaus_cli::https::HttpsFlags;
-use jaus_cli::output::Output;
+use jaus_cli::output::{OUTPUT_IS_LOG, Output};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ocu::users::UsersFile;
-use jaus_ocu::{BaseMap, Listen, Station, Token};
+use jaus_ocu::{BaseMap, Listen, OpenStation, Station, Token};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 #[derive(Args)]
@@ -29,22 +31,27 @@ struct Flags {
     #[arg(long, value_name = "CODE", default_value = "200")]
     authority: u8,
 
-    /// Where to serve the page, ADDRESS:PORT; on any other than a loopback address, changing the
-    /// vehicle requires a token [default: 127.0.0.1:8080 or the next free port]
+    /// Where to serve the page, ADDRESS:PORT [default: 127.0.0.1:8080 or the next free port]
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
 
-    /// Read the token from this one-line file and require it on the loopback interface too; it is
-    /// never printed [default: a generated token, printed on standard output if one is needed]
+    /// Read the page's token from this one-line file; it is never printed [default: a generated
+    /// token, kept in `page.token` beside the user's keys, and printed on standard output with the
+    /// address]
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
 
-    /// Require the token for viewing too, not only for changes
+    /// Let pages without the token look, and stop vehicles
     #[arg(long)]
-    token_to_read: bool,
+    watch_without_token: bool,
+
+    /// Require no token: every user and program of this computer can drive the vehicles; only for a
+    /// loopback address
+    #[arg(long, conflicts_with_all = ["token_file", "watch_without_token"])]
+    unprotected: bool,
 
     /// Require users to log in, each with a role: the file of users that `jaus users` writes
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["token_file", "token_to_read"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["token_file", "watch_without_token", "unprotected"])]
     users: Option<PathBuf>,
 
     #[cfg(feature = "https")]
@@ -71,7 +78,7 @@ impl Ready for Flags {
         "Operator control unit: watch, control and drive vehicles from a browser";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ocu --loopback                        for a vehicle on this computer\n  \
-        jaus-ocu --listen 0.0.0.0:8080             for tablets; prints the address with a token\n  \
+        jaus-ocu --listen 0.0.0.0:8080             for tablets\n  \
         jaus-ocu --listen 0.0.0.0:8080 --token-file /etc/jaus/token --host ocu.local\n  \
         jaus-ocu --listen 0.0.0.0:8443 --https --users ~/.config/jaus/users\n  \
         jaus-ocu --vehicle 101 --vehicle 102 --interface eth0\n  \
@@ -85,10 +92,9 @@ impl Ready for Flags {
         let token = token.map_err(|error| Failure::new(format!("--token-file: {error}")))?;
         let listen = self.listen.map_or(Listen::Loopback, Listen::At);
         let is_loopback = self.listen.is_none_or(|it| it.ip().is_loopback());
-        if self.token_to_read && token.is_none() && is_loopback {
+        if self.unprotected && !is_loopback {
             return Err(Failure::new(
-                "--token-to-read: the loopback interface has no token without --token-file; name \
-                 a file that holds one",
+                "--unprotected: other hosts reach this address; it needs the token or --users",
             ));
         }
         let base_map = self.map.as_deref().map(open_map).transpose()?;
@@ -103,7 +109,9 @@ impl Ready for Flags {
             authority: self.authority,
             listen,
             token,
-            token_to_read: self.token_to_read,
+            token_to_read: !self.watch_without_token,
+            unprotected: self.unprotected,
+            state: state_folder(),
             users,
             tls,
             audit,
@@ -119,7 +127,7 @@ struct Announced(Station);
 impl Part for Announced {
     async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let station = self.0.open().await?;
-        announce(&station.secret_urls());
+        announce(&station);
         if let Some(fingerprint) = station.fingerprint() {
             tracing::info!(
                 "compare the SHA-256 fingerprint of the certificate before you trust it: \
@@ -134,20 +142,39 @@ impl Part for Announced {
 const JOURNAL: &str = "JOURNAL_STREAM";
 
 /// Prints the addresses with the token, unless the output is a log.
-fn announce(secret_urls: &[String]) {
+fn announce(station: &OpenStation) {
+    let secret_urls = station.secret_urls();
     if secret_urls.is_empty() {
         return;
     }
-    if std::env::var_os(JOURNAL).is_some() && !io::stdout().is_terminal() {
-        tracing::warn!(
-            "the generated token is not written to the journal: choose one with --token-file"
-        );
+    let is_log = [JOURNAL, OUTPUT_IS_LOG]
+        .map(env::var_os)
+        .iter()
+        .any(Option::is_some);
+    if is_log && !io::stdout().is_terminal() {
+        let place = match station.token_file() {
+            Some(file) => format!("it is in {}", file.display()),
+            None => "choose one with --token-file".to_owned(),
+        };
+        tracing::warn!("the page's token is not written to the log: {place}");
         return;
     }
     let mut output = Output::new();
     for url in secret_urls {
         // A closed standard output does not stop the station.
         let _ = output.line(format_args!("to control vehicles, open {url}"));
+    }
+}
+
+/// The folder for what the station keeps; `None`, with a warning, if there is none.
+fn state_folder() -> Option<PathBuf> {
+    let folder = service_folder()?;
+    match make_folder_of(&folder.join("page")) {
+        Ok(()) => Some(folder),
+        Err(error) => {
+            tracing::warn!("the page's token and known devices are not kept: {error}");
+            None
+        }
     }
 }
 

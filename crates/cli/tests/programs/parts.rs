@@ -105,28 +105,41 @@ fn the_operators_token_is_never_logged_and_printed_only_if_it_was_generated() {
     let flags_of = |more: &[&str]| -> Vec<String> {
         flags.iter().chain(more).map(|&it| it.to_owned()).collect()
     };
-    for (more, generates) in [(&from_file[..], false), (&["0.0.0.0:0"][..], true)] {
+    let state = ("STATE_DIRECTORY", directory.to_str().unwrap());
+    let mut kept = std::collections::BTreeSet::new();
+    for (more, generates) in [
+        (&from_file[..], false),
+        (&["0.0.0.0:0"][..], true),
+        (&["127.0.0.1:0"][..], true),
+    ] {
         let flags = flags_of(more);
         let flags: Vec<_> = flags.iter().map(String::as_str).collect();
-        let mut program = Program::start_as(station, &flags, &[]);
+        let mut program = Program::start_as(station, &flags, &[state]);
         let said = program.says("the operator's page is at http://");
         assert!(!said.contains(TOKEN) && !said.contains("token="), "{said}");
         if generates {
             let printed = program.prints();
-            assert!(printed.contains("/#token="), "{printed}");
+            let (_, token) = printed.split_once("/#token=").unwrap();
+            kept.insert(token.trim().to_owned());
         } else {
             program.signal("TERM");
             assert_eq!(program.prints(), "");
         }
     }
-    // The journal is a log too.
-    let flags = flags_of(&["0.0.0.0:0"]);
+    assert_eq!(kept.len(), 1, "a restart keeps it");
+    // The journal is a log too, and so is the output of `jaus up` into a file.
+    let flags = flags_of(&["127.0.0.1:0"]);
     let flags: Vec<_> = flags.iter().map(String::as_str).collect();
-    let mut program = Program::start_as(station, &flags, &[("JOURNAL_STREAM", "8:1")]);
-    let said = program.says("the operator's page is at http://");
-    assert!(said.contains("--token-file"), "{said}");
-    program.signal("TERM");
-    assert_eq!(program.prints(), "");
+    for log in [("JOURNAL_STREAM", "8:1"), ("JAUS_OUTPUT_IS_LOG", "1")] {
+        let mut program = Program::start_as(station, &flags, &[log, state]);
+        let said = program.says("the operator's page is at http://");
+        assert!(
+            said.contains("it is in /") && said.contains("page.token"),
+            "{said}"
+        );
+        program.signal("TERM");
+        assert_eq!(program.prints(), "");
+    }
     std::fs::remove_dir_all(directory).unwrap();
 }
 

@@ -25,6 +25,7 @@ export class Emergency {
   #latched = false;
   /** Why the station takes no requests from this page; empty if it does. */
   #barred = "";
+  #clears = false;
   #unbar;
 
   /** Calls `unbar` when the operator stops a vehicle and the station takes no requests. */
@@ -81,13 +82,14 @@ export class Emergency {
   }
 
   /**
-   * Takes a state with whether it is live, the list of vehicles with whether all are to be stopped, and
-   * why the station takes no requests.
+   * Takes a state with whether it is live, the list of vehicles with whether all are to be stopped, why
+   * the station takes no requests, and whether it lets this page clear emergencies.
    */
-  update(state, live, { vehicles, allStopped }, barred) {
+  update(state, live, { vehicles, allStopped }, barred, clears) {
     this.#vehicles = vehicles;
     this.#latched = allStopped;
     this.#barred = barred;
+    this.#clears = clears;
     this.#condition = stopCondition(state?.vehicle, live);
     this.#speed = state?.vehicle?.velocity?.x;
     if (this.#condition) this.#wanted = false;
@@ -125,10 +127,10 @@ export class Emergency {
     say(get("estop-all-detail"), stopAllWords(this.#vehicles, this.#wantedAll));
     mark(get("estop-all"), "data-wanted", this.#wantedAll ? "yes" : null);
     show(get("latch"), this.#latched);
-    get("latch-clear").disabled = Boolean(this.#barred);
+    get("latch-clear").disabled = !this.#clears;
     const stopped = this.#vehicles.filter(({ state }) => state === "emergency").length;
     show(get("clear-all"), stopped > 1 || this.#latched);
-    show(get("estop-clear"), this.#condition !== null && !this.#barred);
+    show(get("estop-clear"), this.#condition !== null && this.#clears);
     if (this.#condition === null) show(get("clear-sheet"), false);
   }
 

@@ -96,6 +96,12 @@ export class Link extends EventTarget {
     return this.#token;
   }
 
+  /** The subprotocols of a WebSocket: they show the token, so that the station takes the page for one of
+   * those that may drive from the start. */
+  get protocols() {
+    return this.#token ? ["jaus", `token.${this.#token}`] : ["jaus"];
+  }
+
   start() {
     setInterval(() => this.#watch(), 500);
     addEventListener("online", () => this.#hurry());
@@ -180,7 +186,7 @@ export class Link extends EventTarget {
     if (this.#vehicle !== null) query.set("vehicle", this.#vehicle);
     // The station may not have noticed yet that the connection before is gone.
     if (this.#page !== null) query.set("replaces", this.#page);
-    const socket = new WebSocket(`${scheme}//${location.host}/ws?${query}`);
+    const socket = new WebSocket(`${scheme}//${location.host}/ws?${query}`, this.protocols);
     this.#socket = socket;
     this.#receivedAt = performance.now();
     this.settled = false;
@@ -304,10 +310,13 @@ export class Link extends EventTarget {
 
 /** The token of the address's fragment, which is wiped from the address, or of this tab's past. */
 function takeToken() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  const given = plainToken(new URLSearchParams(location.hash.slice(1)).get("token"));
   if (given) {
     sessionStorage.setItem(KEY, given);
     history.replaceState(null, "", location.pathname);
   }
-  return given || sessionStorage.getItem(KEY) || "";
+  return given || plainToken(sessionStorage.getItem(KEY));
 }
+
+/** A text if it can be a token: others cannot name a subprotocol. */
+const plainToken = (text) => (/^[\w.~-]{16,256}$/.test(text ?? "") ? text : "");

@@ -37,6 +37,8 @@ let state = null;
 /** Whether the server accepts requests from this page: it requires no token, or has accepted ours, or
  * the user's role allows them. */
 let trusted = false;
+/** Whether the server lets this page look, and so stop vehicles, without the token. */
+let watchable = true;
 /** The authority that the operator's node asks for control with. */
 let authority = null;
 
@@ -44,12 +46,14 @@ let authority = null;
 
 link.addEventListener("hello", async ({ detail }) => {
   trusted = account.users ? account.operates : !detail.token_needed;
+  watchable = detail.watch !== false;
+  show(get("token-no"), watchable);
   map.offerBaseMap(detail.base_map);
   map.reconnect();
   events.reset();
   authority = detail.authority;
   if (detail.token_needed && !trusted && link.token) await offer(link.token);
-  else show(get("token-sheet"), detail.token_needed && !trusted && !watching());
+  else show(get("token-sheet"), detail.token_needed && !trusted && !(watchable && watching()));
   link.settled = true;
   render();
 });
@@ -77,9 +81,10 @@ function render() {
   showLink(link, state);
   const live = link.condition === "live";
   const operable = live && trusted && Boolean(state?.vehicle);
-  const barred = account.missing || (link.open && link.settled && !trusted);
+  // Who may look may stop.
+  const barred = account.missing || (link.open && link.settled && !trusted && !watchable);
   const hint = account.users ? account.hindrance : "enter the token to use it";
-  emergency.update(state, live, fleet, barred ? hint : "");
+  emergency.update(state, live, fleet, barred ? hint : "", trusted);
   sound.update(state, live, fleet.vehicles);
   fleet.update(state, live, link.page);
   const hindrance = hindered(live);
@@ -194,7 +199,6 @@ async function offer(token) {
 /** Shows what a page that may not operate needs for it. */
 function unbar() {
   if (account.missing) account.focus();
-  else if (account.users) toast("warn", "Your role only observes: you cannot stop or drive vehicles.");
   else openTokenSheet();
 }
 

@@ -21,7 +21,7 @@ export class StopLink extends EventTarget {
   #repeats = 0;
 
   /** Stops also by requests of `link`, whose token it shows to the station. */
-  constructor(link, connect = () => new WebSocket(address())) {
+  constructor(link, connect = () => new WebSocket(address(), link.protocols)) {
     super();
     this.#link = link;
     const events = {

@@ -1,64 +1,79 @@
-//! Limits on failed logins, for each address and each user.
+//! Limits on failed logins. Wrong guesses delay the guesser: a device from which the user has logged
+//! in before, or else an address. They make nobody else wait, but for [`SLOWED`].
 
-use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use jaus_view::places::Source;
 
 use super::bounds::{Buckets, Rate};
+use super::devices::DeviceId;
 
-/// Failed logins of one address, by password or token.
-const BY_SOURCE: Rate = Rate {
+/// Failed logins of one device or of one address.
+const BY_GUESSER: Rate = Rate {
     burst: 5,
     period: Duration::from_secs(10),
 };
-/// Failed logins of one user from all addresses, except the one of the last successful login.
+/// Failed logins of one user from all addresses together. Beyond them logins from addresses are
+/// slowed, not refused: otherwise anyone could lock a user out.
 const BY_USER: Rate = Rate {
     burst: 10,
     period: Duration::from_secs(5),
 };
-/// The most addresses, and the most users, whose failures are remembered.
+/// Delay of a login while the user's password is being guessed.
+const SLOWED: Duration = Duration::from_secs(1);
+/// The most guessers, and the most users, whose failures are remembered.
 const REMEMBERED: usize = 1024;
+
+/// Who tries to log in.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Guesser {
+    /// A device from which the user has logged in before.
+    Device(DeviceId),
+    /// Anyone else at this address.
+    Address(Source),
+}
 
 /// Recent failed logins.
 #[derive(Debug)]
 pub(super) struct Attempts {
-    by_source: Buckets<Source>,
+    by_guesser: Buckets<Guesser>,
     by_user: Buckets<String>,
-    /// From where users have logged in last: failures elsewhere do not lock them out there.
-    last: HashMap<String, Source>,
 }
 
 impl Attempts {
     pub(super) fn new() -> Self {
         Self {
-            by_source: Buckets::new(BY_SOURCE, REMEMBERED),
+            by_guesser: Buckets::new(BY_GUESSER, REMEMBERED),
             by_user: Buckets::new(BY_USER, REMEMBERED),
-            last: HashMap::new(),
         }
     }
 
-    /// Begins an attempt, which counts as failed until [`succeeded`](Self::succeeded). Refused
-    /// attempts return the time until the next one is possible.
+    /// Begins an attempt, which counts as failed until [`succeeded`](Self::succeeded). Returns the
+    /// time by which to delay it.
+    ///
+    /// # Errors
+    /// The time until the guesser's next attempt, if it has failed too often.
     pub(super) fn begin(
         &mut self,
         now: Instant,
-        source: Source,
-        user: Option<&str>,
-    ) -> Result<(), Duration> {
-        self.by_source.take(now, &source)?;
-        match user.filter(|user| self.last.get(*user) != Some(&source)) {
-            Some(user) => self.by_user.take(now, &user.to_owned()),
-            None => Ok(()),
+        guesser: &Guesser,
+        user: &str,
+    ) -> Result<Duration, Duration> {
+        self.by_guesser.take(now, guesser)?;
+        match guesser {
+            Guesser::Device(_) => Ok(Duration::ZERO),
+            Guesser::Address(_) => {
+                let is_quiet = self.by_user.take(now, &user.to_owned()).is_ok();
+                Ok(if is_quiet { Duration::ZERO } else { SLOWED })
+            }
         }
     }
 
-    /// The attempt was successful. `user` has been authenticated, so their number is limited.
-    pub(super) fn succeeded(&mut self, source: Source, user: Option<&str>) {
-        self.by_source.give_back(&source);
-        if let Some(user) = user {
+    /// The attempt was successful.
+    pub(super) fn succeeded(&mut self, guesser: &Guesser, user: &str) {
+        self.by_guesser.give_back(guesser);
+        if matches!(guesser, Guesser::Address(_)) {
             self.by_user.give_back(&user.to_owned());
-            self.last.insert(user.to_owned(), source);
         }
     }
 }
@@ -67,31 +82,44 @@ impl Attempts {
 mod tests {
     use super::*;
 
-    fn source(last: u8) -> Source {
-        Source::of(([10, 0, 0, last], 9).into())
+    fn at(last: u8) -> Guesser {
+        Guesser::Address(Source::of(([10, 0, 0, last], 9).into()))
     }
 
     #[test]
-    fn guesses_of_one_address_are_slowed_and_others_log_in() {
+    fn guesses_of_one_address_are_refused_beyond_five_and_others_log_in() {
         let now = Instant::now();
         let mut attempts = Attempts::new();
-        let allowed = (0..100).filter(|_| attempts.begin(now, source(1), Some("anna")).is_ok());
+        let allowed = (0..100).filter(|_| attempts.begin(now, &at(1), "anna").is_ok());
         assert_eq!(allowed.count(), 5);
-        let wait = attempts.begin(now, source(1), Some("ben")).unwrap_err();
-        assert_eq!(wait, BY_SOURCE.period);
-        assert!(attempts.begin(now, source(2), Some("anna")).is_ok());
-        assert!(attempts.begin(now + wait, source(1), Some("ben")).is_ok());
+        let wait = attempts.begin(now, &at(1), "ben").unwrap_err();
+        assert_eq!(wait, BY_GUESSER.period);
+        assert_eq!(attempts.begin(now, &at(2), "anna"), Ok(Duration::ZERO));
+        assert!(attempts.begin(now + wait, &at(1), "ben").is_ok());
     }
 
     #[test]
-    fn guesses_of_many_addresses_are_slowed_too_and_do_not_lock_the_user_out() {
+    fn guesses_of_many_addresses_slow_a_fresh_one_and_refuse_nobody() {
         let now = Instant::now();
         let mut attempts = Attempts::new();
-        attempts.begin(now, source(1), Some("anna")).unwrap();
-        attempts.succeeded(source(1), Some("anna"));
-        let guesses = (2..250).filter(|it| attempts.begin(now, source(*it), Some("anna")).is_ok());
-        assert_eq!(guesses.count(), 10);
-        assert!(attempts.begin(now, source(1), Some("anna")).is_ok());
+        for guess in 0..200_u8 {
+            attempts.begin(now, &at(guess / 5), "anna").unwrap();
+        }
+        assert_eq!(attempts.begin(now, &at(250), "anna"), Ok(SLOWED));
+        assert_eq!(attempts.begin(now, &at(251), "ben"), Ok(Duration::ZERO));
+    }
+
+    #[test]
+    fn a_known_device_is_not_slowed_by_guesses_elsewhere_nor_at_its_own_address() {
+        let now = Instant::now();
+        let mut attempts = Attempts::new();
+        for guess in 0..250_u8 {
+            let _ = attempts.begin(now, &at(guess % 3), "anna");
+        }
+        let device = Guesser::Device(DeviceId::of("anna", "0123456789abcdef"));
+        assert_eq!(attempts.begin(now, &device, "anna"), Ok(Duration::ZERO));
+        let rest = (0..100).filter(|_| attempts.begin(now, &device, "anna").is_ok());
+        assert_eq!(rest.count(), 4, "a stolen device guesses no faster");
     }
 
     #[test]
@@ -99,10 +127,8 @@ mod tests {
         let now = Instant::now();
         let mut attempts = Attempts::new();
         for _ in 0..100 {
-            attempts.begin(now, source(1), Some("anna")).unwrap();
-            attempts.succeeded(source(1), Some("anna"));
-            attempts.begin(now, source(2), None).unwrap();
-            attempts.succeeded(source(2), None);
+            assert_eq!(attempts.begin(now, &at(1), "anna"), Ok(Duration::ZERO));
+            attempts.succeeded(&at(1), "anna");
         }
     }
 }

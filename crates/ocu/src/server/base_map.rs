@@ -21,7 +21,7 @@ pub(super) async fn describe(
     ConnectInfo(address): ConnectInfo<SocketAddr>,
     headers: HeaderMap,
 ) -> Response {
-    match admitted(&shared, &headers, address) {
+    match admitted(&shared, &headers, address).await {
         Ok(map) => Json(map.description()).into_response(),
         Err(refusal) => refusal.into_response(),
     }
@@ -34,7 +34,7 @@ pub(super) async fn serve(
     Path((zoom, x, y)): Path<(u8, u32, u32)>,
     headers: HeaderMap,
 ) -> Response {
-    let map = match admitted(&shared, &headers, address) {
+    let map = match admitted(&shared, &headers, address).await {
         Ok(map) => map.clone(),
         Err(refusal) => return refusal.into_response(),
     };
@@ -67,12 +67,12 @@ pub(super) async fn serve(
 }
 
 /// The map file, if there is one and the request may read it.
-fn admitted<'s>(
+async fn admitted<'s>(
     shared: &'s Shared,
     headers: &HeaderMap,
     address: SocketAddr,
 ) -> Result<&'s BaseMap, Refusal> {
-    shared.check_reader(headers, address)?;
+    shared.check_reader(headers, address).await?;
     let words = "this station has no map file; start jaus-ocu with --map\n";
     let map = shared.admission.base_map.as_ref();
     map.ok_or((StatusCode::NOT_FOUND, words))

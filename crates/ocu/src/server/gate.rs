@@ -1,13 +1,14 @@
-//! Who may use the page: everyone on this host, holders of the token, or users who log in.
+//! Who may use the page: holders of the token, users who log in, or everyone on this host.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::http::{HeaderMap, header};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
+use super::devices::{DeviceId, Devices};
 use super::logins::{Ending, Login, LoginId, Logins};
 use super::trail::Trail;
 use super::visitor::Visitor;
@@ -19,12 +20,12 @@ const OPERATOR: &str = "operator";
 
 /// Who may use the page.
 pub(crate) enum Gate {
-    /// Everyone who reaches it.
+    /// Everyone who reaches it: other users and programs of this host, too.
     Open,
-    /// Changes require the token, and viewing too if `to_read` is set.
+    /// Driving requires the token, and looking and stopping too if `to_read` is set.
     Token { token: Token, to_read: bool },
     /// Everything requires a login.
-    Users(UserGate),
+    Users(Box<UserGate>),
 }
 
 impl Gate {
@@ -40,7 +41,12 @@ impl Gate {
         }
     }
 
-    pub(super) const fn users(&self) -> Option<&UserGate> {
+    /// Whether a page without the token may look.
+    pub(super) const fn lets_watch(&self) -> bool {
+        !matches!(self, Self::Token { to_read: true, .. })
+    }
+
+    pub(super) fn users(&self) -> Option<&UserGate> {
         match self {
             Self::Users(gate) => Some(gate),
             _ => None,
@@ -75,17 +81,43 @@ pub(crate) struct UserGate {
     cookie: String,
     /// Whether the page is served over TLS.
     is_secure: bool,
-    /// Logins that are being verified, or wait for it.
+    /// From where users have logged in before.
+    devices: Devices,
+    /// Logins from known devices, and all others: those never wait for these.
+    lanes: [LoginQueue; 2],
+}
+
+/// Logins that are verified one after another.
+struct LoginQueue {
+    /// Those that are being verified, or wait for it.
     waiting: Semaphore,
     /// Verifies one password at a time, which takes 19 MiB.
     verifier: Arc<Semaphore>,
 }
 
-impl UserGate {
+impl LoginQueue {
     /// The most logins that are being verified, or wait for it.
     const MOST_WAITING: usize = 16;
 
-    pub(crate) fn new(file: UsersFile, port: u16, is_secure: bool, trail: Trail) -> Self {
+    fn new() -> Self {
+        Self {
+            waiting: Semaphore::new(Self::MOST_WAITING),
+            verifier: Arc::new(Semaphore::new(1)),
+        }
+    }
+}
+
+impl UserGate {
+    /// How long browsers keep the cookie of a device.
+    const DEVICE_AGE: Duration = Duration::from_secs(180 * 24 * 3600);
+
+    pub(crate) fn new(
+        file: UsersFile,
+        devices: Devices,
+        port: u16,
+        is_secure: bool,
+        trail: Trail,
+    ) -> Self {
         let cookie = if is_secure {
             format!("__Host-jaus-{port}")
         } else {
@@ -97,8 +129,8 @@ impl UserGate {
             trail,
             cookie,
             is_secure,
-            waiting: Semaphore::new(Self::MOST_WAITING),
-            verifier: Arc::new(Semaphore::new(1)),
+            devices,
+            lanes: [LoginQueue::new(), LoginQueue::new()],
         }
     }
 
@@ -112,7 +144,7 @@ impl UserGate {
     }
 
     fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
-        let secret = self.secret(headers)?;
+        let secret = cookie(headers, &self.cookie)?;
         let logins = self.logins();
         let login = logins.find(secret)?;
         let name = &login.user.name;
@@ -124,14 +156,35 @@ impl UserGate {
         ))
     }
 
-    /// The secret in the request's cookie.
-    fn secret<'h>(&self, headers: &'h HeaderMap) -> Option<&'h str> {
-        let cookies = headers.get_all(header::COOKIE).iter();
-        let mut pairs = cookies
-            .filter_map(|it| it.to_str().ok())
-            .flat_map(|it| it.split(';'))
-            .filter_map(|it| it.trim().split_once('='));
-        pairs.find_map(|(name, value)| (name == self.cookie).then_some(value))
+    /// The device of a request, if the user has logged in from it before.
+    pub(super) fn device(&self, headers: &HeaderMap, user: &str) -> Option<DeviceId> {
+        let secret = cookie(headers, &self.device_cookie())?;
+        self.devices.find(user, secret)
+    }
+
+    /// The user has logged in from the device of a request. Returns the header `Set-Cookie` by which
+    /// it is known again.
+    pub(super) fn remember_device(
+        &self,
+        headers: &HeaderMap,
+        user: &str,
+    ) -> Result<String, LoginError> {
+        let users = self.users();
+        let shown = cookie(headers, &self.device_cookie());
+        let known = shown.filter(|secret| self.devices.is_known(&users, secret));
+        let secret = match known.and_then(Token::new) {
+            Some(secret) => secret,
+            None => Token::generate().map_err(|_| LoginError::NoRandomness)?,
+        };
+        self.devices.remember(&users, user, &secret);
+        let age = Self::DEVICE_AGE.as_secs();
+        let cookie = self.cookie_with(&self.device_cookie(), secret.reveal());
+        Ok(format!("{cookie}; Max-Age={age}"))
+    }
+
+    /// Name of the cookie with a device's secret.
+    fn device_cookie(&self) -> String {
+        format!("{}-device", self.cookie)
     }
 
     /// Verifies a password, and begins a session. Returns its secret.
@@ -140,10 +193,13 @@ impl UserGate {
         name: &str,
         password: String,
         address: SocketAddr,
+        is_known_device: bool,
     ) -> Result<Token, LoginError> {
-        let _place = self.waiting.try_acquire().map_err(|_| LoginError::Busy)?;
+        let [known, others] = &self.lanes;
+        let lane = if is_known_device { known } else { others };
+        let _place = lane.waiting.try_acquire().map_err(|_| LoginError::Busy)?;
         // The permit fails only if the semaphore is closed, which never happens.
-        let permit = self.verifier.clone().acquire_owned().await;
+        let permit = lane.verifier.clone().acquire_owned().await;
         let user = self.users().find(name).cloned();
         let verify = move || {
             let _permit = permit;
@@ -168,20 +224,18 @@ impl UserGate {
     /// The header `Set-Cookie` for a secret.
     pub(super) fn set_cookie(&self, secret: &Token) -> String {
         let age = Logins::LONGEST.as_secs();
-        format!("{}; Max-Age={age}", self.cookie_with(secret.reveal()))
+        let cookie = self.cookie_with(&self.cookie, secret.reveal());
+        format!("{cookie}; Max-Age={age}")
     }
 
     /// The header `Set-Cookie` that removes the cookie.
     pub(super) fn clear_cookie(&self) -> String {
-        format!("{}; Max-Age=0", self.cookie_with(""))
+        format!("{}; Max-Age=0", self.cookie_with(&self.cookie, ""))
     }
 
-    fn cookie_with(&self, value: &str) -> String {
+    fn cookie_with(&self, name: &str, value: &str) -> String {
         let secure = if self.is_secure { "; Secure" } else { "" };
-        format!(
-            "{}={value}; Path=/; HttpOnly; SameSite=Strict{secure}",
-            self.cookie
-        )
+        format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict{secure}")
     }
 
     /// Ends a session.
@@ -218,4 +272,14 @@ impl UserGate {
             self.trail.ended(&login, &why);
         }
     }
+}
+
+/// The value of a cookie of a request.
+fn cookie<'h>(headers: &'h HeaderMap, wanted: &str) -> Option<&'h str> {
+    let cookies = headers.get_all(header::COOKIE).iter();
+    let mut pairs = cookies
+        .filter_map(|it| it.to_str().ok())
+        .flat_map(|it| it.split(';'))
+        .filter_map(|it| it.trim().split_once('='));
+    pairs.find_map(|(name, value)| (name == wanted).then_some(value))
 }

@@ -8,11 +8,12 @@ use axum::Json;
 use axum::body::{Body, to_bytes};
 use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::{AppendHeaders, IntoResponse, Response};
 use jaus_view::places::Source;
 use serde::{Deserialize, Serialize};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
+use super::attempts::Guesser;
 use super::gate::{LoginError, UserGate};
 use super::logins::{Ending, LoginId};
 use super::visitor::Visitor;
@@ -83,6 +84,7 @@ pub(super) async fn session(
 pub(super) async fn log_in(
     State(shared): State<Arc<Shared>>,
     ConnectInfo(address): Peer,
+    headers: HeaderMap,
     body: Body,
 ) -> Response {
     let Some(gate) = shared.admission.gate.users() else {
@@ -92,18 +94,30 @@ pub(super) async fn log_in(
         let words = "send a JSON object with name and password\n";
         return (StatusCode::BAD_REQUEST, words).into_response();
     };
-    let source = Source::of(address);
-    let begun = shared.attempts().begin(Instant::now(), source, Some(&name));
-    if let Err(wait) = begun {
-        shared.note_refused_login(&name, address, "too many failed logins");
-        return slow_down(wait);
+    let guesser = match gate.device(&headers, &name) {
+        Some(device) => Guesser::Device(device),
+        None => Guesser::Address(Source::of(address)),
+    };
+    let begun = shared.attempts().begin(Instant::now(), &guesser, &name);
+    match begun {
+        Ok(delay) => sleep(delay).await,
+        Err(wait) => {
+            shared.note_refused_login(&name, address, "too many failed logins");
+            return slow_down(wait);
+        }
     }
-    match gate.log_in(&name, password, address).await {
-        Ok(secret) => {
-            shared.attempts().succeeded(source, Some(&name));
+    let is_known_device = matches!(guesser, Guesser::Device(_));
+    let login = gate.log_in(&name, password, address, is_known_device);
+    let logged_in = login.await.and_then(|secret| {
+        let device = gate.remember_device(&headers, &name)?;
+        Ok([gate.set_cookie(&secret), device])
+    });
+    match logged_in {
+        Ok(cookies) => {
+            shared.attempts().succeeded(&guesser, &name);
             shared.admission.trail.login(&name, address, None);
-            let cookie = [(header::SET_COOKIE, gate.set_cookie(&secret))];
-            (StatusCode::NO_CONTENT, cookie).into_response()
+            let cookies = cookies.map(|it| (header::SET_COOKIE, it));
+            (StatusCode::NO_CONTENT, AppendHeaders(cookies)).into_response()
         }
         Err(error) => {
             let words = error.to_string();

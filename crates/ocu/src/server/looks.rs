@@ -39,7 +39,7 @@ pub(super) async fn serve_overlay(
     Query(Known { zones }): Query<Known>,
     headers: HeaderMap,
 ) -> Response {
-    if let Err(refusal) = shared.check_reader(&headers, address) {
+    if let Err(refusal) = shared.check_reader(&headers, address).await {
         return refusal.into_response();
     }
     let (reply, overlay) = oneshot::channel();
@@ -64,7 +64,7 @@ pub(super) async fn serve_events(
     Query(After { after }): Query<After>,
     headers: HeaderMap,
 ) -> Response {
-    if let Err(refusal) = shared.check_reader(&headers, address) {
+    if let Err(refusal) = shared.check_reader(&headers, address).await {
         return refusal.into_response();
     }
     let (reply, events) = oneshot::channel();

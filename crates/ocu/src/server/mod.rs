@@ -5,6 +5,7 @@ mod attempts;
 mod base_map;
 pub(super) mod bounds;
 mod connections;
+mod devices;
 mod gate;
 mod guard;
 mod login;
@@ -28,16 +29,18 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
-use jaus_view::places::{NoPlace, Places, Source};
+use jaus_view::places::{NoPlace, Place, Places, Source};
 use serde::Serialize;
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, oneshot};
-use tokio::time::interval;
+use tokio::time::{interval, sleep};
 
 use self::attempts::Attempts;
+pub(super) use self::devices::Devices;
 pub(super) use self::gate::{Gate, UserGate};
 use self::socket::Introduction;
 pub(super) use self::trail::Trail;
+use self::visitor::Visitor;
 use super::base_map::BaseMap;
 use super::orders::{Access, Order};
 use super::page::{self, File};
@@ -74,6 +77,9 @@ struct Shared {
     places: Places,
     /// Limits the number of connections for stops.
     stop_places: Places,
+    /// Limit those that have not shown the token. They take no place of the others.
+    strangers: Places,
+    stop_strangers: Places,
     /// Limits failed logins.
     attempts: Mutex<Attempts>,
     /// Limits the number of tiles of the map file that are read at once.
@@ -95,6 +101,9 @@ struct Counters {
     /// Pages that exceeded the frame size or rate.
     too_much: AtomicU64,
 }
+
+/// Delay of the answer to a wrong token.
+const WRONG_TOKEN: Duration = Duration::from_secs(1);
 
 /// Status and text for a request that may not see what it asks for.
 type Refusal = (StatusCode, &'static str);
@@ -118,6 +127,8 @@ impl Server {
     const PAGES_OF_ADDRESS: usize = 8;
     /// Connections for stops of one page.
     const STOPS_OF_PAGE: usize = 2;
+    /// Maximum number of pages without the token.
+    const STRANGERS: usize = 16;
     /// Interval of checking sessions and the users file.
     const CHECK: Duration = Duration::from_secs(1);
 
@@ -129,6 +140,11 @@ impl Server {
             places: Places::new(Self::PAGES, Self::PAGES_OF_ADDRESS),
             stop_places: Places::new(
                 Self::PAGES * Self::STOPS_OF_PAGE,
+                Self::PAGES_OF_ADDRESS * Self::STOPS_OF_PAGE,
+            ),
+            strangers: Places::new(Self::STRANGERS, Self::PAGES_OF_ADDRESS),
+            stop_strangers: Places::new(
+                Self::STRANGERS * Self::STOPS_OF_PAGE,
                 Self::PAGES_OF_ADDRESS * Self::STOPS_OF_PAGE,
             ),
             attempts: Mutex::new(Attempts::new()),
@@ -217,7 +233,7 @@ async fn health(State(shared): State<Arc<Shared>>) -> Json<Health> {
     let counters = &shared.counters;
     Json(Health {
         ok: true,
-        pages: shared.places.taken(),
+        pages: shared.places.taken() + shared.strangers.taken(),
         no_place: counters.no_place.load(Relaxed),
         strangers: counters.strangers.load(Relaxed),
         wrong_tokens: counters.wrong_tokens.load(Relaxed),
@@ -234,7 +250,7 @@ async fn serve_map(
     Path((vehicle, map)): Path<(u16, u16)>,
     headers: HeaderMap,
 ) -> Response {
-    if let Err(refusal) = shared.check_reader(&headers, address) {
+    if let Err(refusal) = shared.check_reader(&headers, address).await {
         return refusal.into_response();
     }
     let (reply, cells) = oneshot::channel();
@@ -268,27 +284,16 @@ async fn serve_page(
     let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
         return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
     };
-    let place = match shared.places.take(Source::of(address)) {
-        Ok(place) => place,
-        Err(why) => {
-            shared.counters.no_place.fetch_add(1, Relaxed);
-            let words = match why {
-                NoPlace::Full => format!("the limit of {} pages is reached", Server::PAGES),
-                NoPlace::Share => format!(
-                    "the limit of {} pages of one address is reached",
-                    Server::PAGES_OF_ADDRESS
-                ),
-            };
-            let words = words + "; close one of them\n";
-            return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();
-        }
-    };
+    let seats = [&shared.places, &shared.strangers];
+    if let Err(words) = shared.seat(&visitor, &headers, seats).await {
+        return (StatusCode::SERVICE_UNAVAILABLE, words + "\n").into_response();
+    }
     upgrade
+        .protocols([SUBPROTOCOL])
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
         .on_upgrade(async move |socket| {
             socket::serve(socket, shared, visitor, introduction).await;
-            drop(place);
         })
 }
 
@@ -301,17 +306,31 @@ async fn serve_stops(
     let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
         return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
     };
-    let Ok(place) = shared.stop_places.take(Source::of(address)) else {
-        shared.counters.no_place.fetch_add(1, Relaxed);
-        return (StatusCode::SERVICE_UNAVAILABLE, "too many connections\n").into_response();
-    };
+    let seats = [&shared.stop_places, &shared.stop_strangers];
+    if let Err(words) = shared.seat(&visitor, &headers, seats).await {
+        return (StatusCode::SERVICE_UNAVAILABLE, words + "\n").into_response();
+    }
     upgrade
+        .protocols([SUBPROTOCOL])
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
         .on_upgrade(async move |socket| {
             stop_socket::serve(socket, shared, visitor).await;
-            drop(place);
         })
+}
+
+/// The subprotocol of a page's WebSocket. A browser sets no other header of a WebSocket, so a page
+/// names the token there as well.
+const SUBPROTOCOL: &str = "jaus";
+const TOKEN_SUBPROTOCOL: &str = "token.";
+
+/// The token that a page shows as it opens a WebSocket.
+fn token_of_handshake(headers: &HeaderMap) -> Option<&str> {
+    let named = headers.get_all(header::SEC_WEBSOCKET_PROTOCOL).iter();
+    let mut named = named
+        .filter_map(|it| it.to_str().ok())
+        .flat_map(|it| it.split(','));
+    named.find_map(|it| it.trim().strip_prefix(TOKEN_SUBPROTOCOL))
 }
 
 impl Shared {
@@ -319,21 +338,80 @@ impl Shared {
         self.attempts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the shown token is right. Wrong tokens are counted, and slow down their address.
-    fn admits(&self, shown: &str, address: SocketAddr) -> Result<(), &'static str> {
-        let Some(token) = self.admission.gate.token() else {
-            return Ok(());
-        };
-        let source = Source::of(address);
-        let begun = self.attempts().begin(Instant::now(), source, None);
-        if begun.is_ok() && token.is(shown) {
-            self.attempts().succeeded(source, None);
-            return Ok(());
+    /// Whether the shown token is right. Wrong ones are counted, and answered late: with at least 16
+    /// characters and the limits of connections, that is enough, and no guess makes others wait.
+    async fn admits(&self, shown: &str) -> bool {
+        let token = self.admission.gate.token();
+        if token.is_none_or(|it| it.is(shown)) {
+            return true;
         }
         self.counters.wrong_tokens.fetch_add(1, Relaxed);
-        Err(match begun {
-            Ok(()) => "wrong token",
-            Err(_) => "too many wrong tokens; try again in 10 s",
+        sleep(WRONG_TOKEN).await;
+        false
+    }
+
+    /// Takes a place for a new connection: one of a user or with the right token takes none of the pages
+    /// without.
+    ///
+    /// # Errors
+    /// Why there is no place.
+    async fn seat(
+        &self,
+        visitor: &Visitor,
+        headers: &HeaderMap,
+        [places, strangers]: [&Places; 2],
+    ) -> Result<(), String> {
+        if visitor.may(UserRole::Drive) || visitor.login.is_some() {
+            visitor.settle(Some(self.place(places, visitor)?));
+            return Ok(());
+        }
+        match token_of_handshake(headers) {
+            Some(shown) if self.admits(shown).await => self.trust(visitor, places),
+            // The page is told of its wrong token, and may ask for another.
+            _ => {
+                visitor.settle(Some(self.place(strangers, visitor)?));
+                Ok(())
+            }
+        }
+    }
+
+    /// Checks the token that a page shows later.
+    ///
+    /// # Errors
+    /// Why it gains the page nothing.
+    async fn admit_later(
+        &self,
+        visitor: &Visitor,
+        shown: &str,
+        places: &Places,
+    ) -> Result<(), String> {
+        if !self.admits(shown).await {
+            return Err("wrong token".to_owned());
+        }
+        if self.admission.gate.token().is_none() || visitor.may(UserRole::Drive) {
+            return Ok(());
+        }
+        self.trust(visitor, places)
+    }
+
+    fn trust(&self, visitor: &Visitor, places: &Places) -> Result<(), String> {
+        visitor.settle(Some(self.place(places, visitor)?));
+        visitor.trust();
+        let Visitor { user, address, .. } = visitor;
+        self.admission.trail.login(user, *address, None);
+        Ok(())
+    }
+
+    fn place(&self, places: &Places, visitor: &Visitor) -> Result<Place, String> {
+        places.take(Source::of(visitor.address)).map_err(|why| {
+            self.counters.no_place.fetch_add(1, Relaxed);
+            let of_address = Server::PAGES_OF_ADDRESS;
+            match why {
+                NoPlace::Full => "the limit of pages is reached; close one of them".to_owned(),
+                NoPlace::Share => format!(
+                    "the limit of {of_address} pages of one address is reached; close one of them"
+                ),
+            }
         })
     }
 
@@ -349,7 +427,7 @@ impl Shared {
     }
 
     /// Checks that a request may read vehicle data.
-    fn check_reader(&self, headers: &HeaderMap, address: SocketAddr) -> Result<(), Refusal> {
+    async fn check_reader(&self, headers: &HeaderMap, address: SocketAddr) -> Result<(), Refusal> {
         let Some(visitor) = self.admission.gate.visitor(headers, address) else {
             return Err((StatusCode::UNAUTHORIZED, "log in first\n"));
         };
@@ -358,8 +436,8 @@ impl Shared {
         }
         let shown = headers.get(header::AUTHORIZATION);
         let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
-        match shown.map(|it| self.admits(it, address)) {
-            Some(Ok(())) => Ok(()),
+        match shown {
+            Some(shown) if self.admits(shown).await => Ok(()),
             _ => {
                 let words = "this requires the token: send Authorization: Bearer TOKEN\n";
                 Err((StatusCode::UNAUTHORIZED, words))

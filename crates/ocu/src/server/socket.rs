@@ -34,8 +34,6 @@ const ANSWERS: usize = 64;
 const STUCK: Duration = Duration::from_secs(5);
 /// Ping interval. Browsers answer pings automatically.
 const PING: Duration = Duration::from_secs(5);
-/// Delay of the reply to a wrong token.
-const WRONG_TOKEN: Duration = Duration::from_secs(1);
 /// Number of wrong tokens after which the connection is closed.
 const WRONG_TOKENS: u32 = 5;
 /// A page that sees nothing without the token is disconnected after this time.
@@ -138,6 +136,8 @@ pub(super) async fn serve(
         // Best effort: the page may not be reading, or not answer.
         let _ = timeout(STUCK, close).await;
     }
+    // Requests that are still being answered hold the visitor.
+    visitor.settle(None);
 }
 
 /// Code and reason of the Close frame.
@@ -249,21 +249,19 @@ impl Reader<'_> {
     /// Handles a token from the page.
     async fn show(&mut self, id: Option<u64>, token: &str) -> Option<Parting> {
         let address = self.visitor.address;
-        let Err(why) = self.shared.admits(token, address) else {
-            if self.shared.admission.gate.token().is_some() {
-                self.visitor.trust();
-                let user = &self.visitor.user;
-                self.shared.admission.trail.login(user, address, None);
-            }
+        let Err(why) = self
+            .shared
+            .admit_later(self.visitor, token, &self.shared.places)
+            .await
+        else {
             self.say(id.map(|id| Answer::Done { id }).as_ref());
             return None;
         };
         self.wrong_tokens += 1;
         tracing::warn!(page = self.page.0, "{why}");
         let user = &self.visitor.user;
-        self.shared.admission.trail.login(user, address, Some(why));
-        sleep(WRONG_TOKEN).await;
-        self.refuse(id, why);
+        self.shared.admission.trail.login(user, address, Some(&why));
+        self.refuse(id, &why);
         (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
     }
 
@@ -502,6 +500,7 @@ impl Writer<'_> {
             version: VERSION,
             page: self.page.0,
             token_needed: admission.gate.token().is_some(),
+            watch: admission.gate.lets_watch(),
             operator: admission.operator.to_string(),
             authority: admission.authority,
             base_map: admission.base_map.is_some(),

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use tokio::sync::mpsc;
-use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::Shared;
 use super::bounds::{Bucket, FRAMES};
@@ -30,8 +30,6 @@ const PING: Duration = Duration::from_secs(10);
 const STUCK: Duration = Duration::from_secs(5);
 /// Largest frame, except that with the token.
 const LARGEST: usize = 32;
-/// Delay of the reply to a wrong token.
-const WRONG_TOKEN: Duration = Duration::from_secs(1);
 /// Limit of queued answers. Further answers are dropped.
 const ANSWERS: usize = 8;
 
@@ -109,14 +107,11 @@ impl<'s> Stops<'s> {
 
     /// Handles a token. A wrong one ends the connection.
     async fn show(&self, token: &str) -> Option<Parting> {
-        if self.shared.admits(token, self.visitor.address).is_ok() {
-            if self.shared.admission.gate.token().is_some() {
-                self.visitor.trust();
-            }
-            return None;
+        let places = &self.shared.stop_places;
+        match self.shared.admit_later(self.visitor, token, places).await {
+            Ok(()) => None,
+            Err(_) => Some((close_code::POLICY, "wrong token")),
         }
-        sleep(WRONG_TOKEN).await;
-        Some((close_code::POLICY, "wrong token"))
     }
 
     async fn stop(&self, text: &str) -> Option<Parting> {

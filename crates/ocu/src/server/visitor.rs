@@ -3,6 +3,8 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use jaus_view::places::Place;
+
 use super::logins::LoginId;
 use crate::users::UserRole;
 
@@ -15,6 +17,9 @@ pub(super) struct Visitor {
     pub(super) login: Option<LoginId>,
     /// `None` without permission to see anything. The right token raises it.
     role: Mutex<Option<UserRole>>,
+    /// The place of the visitor's page. That of a page without the token is taken from a share that
+    /// such pages have of their own.
+    place: Mutex<Option<Place>>,
 }
 
 impl Visitor {
@@ -29,6 +34,7 @@ impl Visitor {
             address,
             login,
             role: Mutex::new(role),
+            place: Mutex::new(None),
         }
     }
 
@@ -44,5 +50,10 @@ impl Visitor {
     pub(super) fn trust(&self) {
         let mut role = self.role.lock().unwrap_or_else(PoisonError::into_inner);
         *role = Some(UserRole::Drive);
+    }
+
+    /// The visitor's page has this place from now on; `None` when it is gone.
+    pub(super) fn settle(&self, place: Option<Place>) {
+        *self.place.lock().unwrap_or_else(PoisonError::into_inner) = place;
     }
 }

@@ -50,8 +50,9 @@ fn text_of(path: &Path) -> Result<String, UsersError> {
     }
 }
 
-/// Replaces a file in one step, so that a station reads the old or the new text.
-fn replace(path: &Path, text: &str) -> Result<(), UsersError> {
+/// Replaces a file in one step, so that a station reads the old or the new text. It is for its owner
+/// alone.
+pub(crate) fn replace(path: &Path, text: &str) -> Result<(), UsersError> {
     let draft = path.with_extension("new");
     let write = || -> io::Result<()> {
         let mut options = OpenOptions::new();

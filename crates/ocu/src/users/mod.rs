@@ -18,6 +18,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
+pub(crate) use self::edit::replace;
 pub use self::edit::{add, remove};
 pub use self::file::{UsersError, UsersFile};
 pub use self::password::{PasswordError, PasswordHash};

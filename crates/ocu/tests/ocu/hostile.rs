@@ -3,7 +3,7 @@
 use std::net::Ipv4Addr;
 
 use futures_util::{SinkExt, StreamExt};
-use jaus_ocu::{Station, Token};
+use jaus_ocu::{Listen, Station, Token};
 use jaus_test_kit::waiting::within_limit;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -56,20 +56,27 @@ async fn parting(page: &mut Page) -> CloseFrame {
 }
 
 #[tokio::test]
-async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessing() {
+async fn without_the_token_a_page_may_look_and_stop_and_nothing_else_not_even_by_guessing() {
     let scene = guarded(false).await;
     let mut page = scene.page().await;
     assert_eq!(page.hello["token_needed"], true);
+    assert_eq!(page.hello["watch"], true);
     page.until(|state| driver_of(state)["state"] == "standby")
         .await;
     for request in [
         json!({"type": "control", "on": true}),
         json!({"type": "emergency", "on": false}),
         json!({"type": "resume"}),
+        json!({"type": "emergency_all", "on": false}),
     ] {
         let refused = page.ask(request).await.unwrap_err();
         assert!(refused.contains("token"), "{refused}");
     }
+    page.ask(json!({"type": "emergency", "on": true}))
+        .await
+        .unwrap();
+    page.until(|state| state["vehicle"]["emergency"] == true)
+        .await;
     let wrong = json!({"type": "token", "token": "correct-horse-batterz"});
     assert_eq!(page.ask(wrong).await.unwrap_err(), "wrong token");
     page.ask(json!({"type": "control", "on": true}))
@@ -81,6 +88,11 @@ async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessi
     page.ask(json!({"type": "token", "token": TOKEN}))
         .await
         .unwrap();
+    page.ask(json!({"type": "emergency", "on": false}))
+        .await
+        .unwrap();
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
     page.ask(json!({"type": "control", "on": true}))
         .await
         .unwrap();
@@ -105,9 +117,17 @@ async fn who_guesses_five_times_is_shown_the_door() {
 async fn if_looking_needs_the_token_nothing_is_shown_before() {
     let scene = guarded(true).await;
     let mut page = scene.page().await;
-    page.say(&json!({"type": "control", "on": true, "id": 1}))
-        .await;
-    assert_eq!(page.next().await["type"], "refused", "and no state before");
+    assert_eq!(page.hello["watch"], false);
+    for request in [
+        json!({"type": "control", "on": true, "id": 1}),
+        json!({"type": "emergency", "on": true, "id": 1}),
+        json!({"type": "messages", "on": true, "id": 1}),
+    ] {
+        page.say(&request).await;
+        assert_eq!(page.next().await["type"], "refused", "and no state before");
+    }
+    let tile = get(&scene, "/base-map", "Host: localhost\r\n").await;
+    assert!(tile.starts_with("HTTP/1.1 401"), "{tile}");
     let map = get(&scene, "/map/101/1", "Host: localhost\r\n").await;
     assert!(map.starts_with("HTTP/1.1 401"), "{map}");
     let shown = format!("Host: localhost\r\nAuthorization: Bearer {TOKEN}\r\n");
@@ -273,6 +293,80 @@ async fn an_address_with_many_sockets_and_no_token_takes_no_page_of_others() {
         .await
         .unwrap();
     page.select(101).await;
+}
+
+#[tokio::test]
+async fn by_default_a_page_on_loopback_needs_the_token_for_everything() {
+    let station = Station {
+        listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+        ..Station::default()
+    };
+    let open = station.open().await.unwrap();
+    let url = open.secret_urls().pop().unwrap();
+    let (_, token) = url.split_once("/#token=").unwrap();
+    assert_eq!(token.len(), 32);
+    let scene = Scene::with(
+        Station {
+            token: Token::new(token),
+            ..Station::default()
+        },
+        0,
+    )
+    .await;
+    let mut page = scene.page().await;
+    assert_eq!(
+        (&page.hello["token_needed"], &page.hello["watch"]),
+        (&json!(true), &json!(false))
+    );
+    page.say(&json!({"type": "emergency", "on": true, "id": 1}))
+        .await;
+    assert_eq!(page.next().await["type"], "refused", "and no state before");
+    let unprotected = Station {
+        listen: Listen::At((Ipv4Addr::UNSPECIFIED, 0).into()),
+        unprotected: true,
+        ..Station::default()
+    };
+    unprotected.open().await.unwrap_err();
+}
+
+/// Opens a page that shows a token as it connects.
+async fn page_with(scene: &Scene, token: &str) -> Result<Page, Box<Error>> {
+    let protocols = format!("jaus, token.{token}");
+    Page::try_open(scene.address, &[("sec-websocket-protocol", &protocols)]).await
+}
+
+/// They have the address of the operator's browser, and take all the places that they can get.
+#[tokio::test]
+async fn pages_of_another_user_of_the_host_keep_no_operator_out() {
+    let scene = guarded(true).await;
+    let mut strangers = Vec::new();
+    for _ in 0..40 {
+        strangers.extend(Page::try_open(scene.address, &[]).await);
+    }
+    assert_eq!(strangers.len(), 8);
+    for guess in 0..3 {
+        let refused = page_with(&scene, &format!("0123456789abcdef{guess}")).await;
+        assert!(refused.is_err(), "it is a stranger's, too");
+    }
+    let mut pages = Vec::new();
+    for _ in 0..8 {
+        let mut page = page_with(&scene, TOKEN).await.unwrap();
+        page.state().await;
+        pages.push(page);
+    }
+    assert!(page_with(&scene, TOKEN).await.is_err(), "the ninth");
+    pages.pop();
+    // A page that shows it later leaves the places of strangers.
+    let mut late = strangers.pop().unwrap();
+    within_limit(async {
+        let shown = json!({"type": "token", "token": TOKEN});
+        while late.ask(shown.clone()).await.is_err() {
+            tokio::task::yield_now().await;
+        }
+    })
+    .await;
+    late.state().await;
+    Page::try_open(scene.address, &[]).await.unwrap();
 }
 
 #[tokio::test]

@@ -67,6 +67,7 @@ impl Scene {
         let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+            unprotected: station.token.is_none() && station.users.is_none(),
             ..station
         };
         let (address, station, session) = start(station, 42, group).await;
@@ -91,6 +92,7 @@ impl Scene {
         let station = Station {
             authority,
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+            unprotected: true,
             ..Station::default()
         };
         start(station, 43, self.group).await

@@ -46,6 +46,7 @@ impl Guarded {
         let log = folder.path().join("audit.jsonl");
         let station = Station {
             users: Some(UsersFile::load(&file).unwrap()),
+            state: Some(folder.path().to_owned()),
             audit: Some(AuditLog::open(&log, Limits::default()).unwrap()),
             ..Station::default()
         };
@@ -86,8 +87,25 @@ impl Guarded {
     }
 
     async fn try_login(&self, name: &str, password: &str) -> (String, String) {
+        self.try_login_from("", name, password).await
+    }
+
+    /// From a browser with this cookie.
+    async fn try_login_from(&self, cookie: &str, name: &str, password: &str) -> (String, String) {
         let body = json!({"name": name, "password": password}).to_string();
-        self.post("/login", "", &body).await
+        self.post("/login", cookie, &body).await
+    }
+
+    /// Guesses a password until this address is refused.
+    async fn guess_until_refused(&self, name: &str) {
+        // A slow machine gets another attempt each 10 s.
+        for _ in 0..50 {
+            let (head, _) = self.try_login(name, "wrong").await;
+            if head.starts_with("HTTP/1.1 429") {
+                return assert!(head.to_lowercase().contains("retry-after: "), "{head}");
+            }
+        }
+        panic!("it may guess on and on");
     }
 
     /// Logs in. Returns the cookie.
@@ -174,22 +192,62 @@ async fn a_wrong_password_and_an_unknown_user_get_the_same_answer() {
 #[tokio::test]
 async fn after_five_failures_an_address_has_to_wait_even_with_the_right_password() {
     let guarded = Guarded::new().await;
-    let mut slowed = false;
-    // A slow machine gets another attempt each 10 s.
-    for _ in 0..50 {
-        let (head, _) = guarded.try_login("anna", "wrong").await;
-        slowed = head.starts_with("HTTP/1.1 429");
-        if slowed {
-            assert!(head.to_lowercase().contains("retry-after: "), "{head}");
-            break;
-        }
-    }
-    assert!(slowed);
+    guarded.guess_until_refused("anna").await;
     until(|| guarded.has_recorded(&["too many failed logins", "refused"])).await;
 }
 
 #[tokio::test]
-async fn one_who_observes_sees_the_vehicle_may_stop_it_and_changes_nothing_else() {
+async fn a_browser_from_which_a_user_has_logged_in_is_not_locked_out_by_guesses_at_its_address() {
+    let guarded = Guarded::new().await;
+    let (head, _) = guarded.try_login("anna", PASSWORD).await;
+    let cookie = head.lines().find(|it| it.contains("-device=")).unwrap();
+    for attribute in ["; HttpOnly", "; SameSite=Strict", "; Max-Age=15552000"] {
+        assert!(cookie.contains(attribute), "{cookie}");
+    }
+    let cookie = cookie.strip_prefix("set-cookie: ").unwrap();
+    let device = cookie.split(';').next().unwrap();
+    guarded.guess_until_refused("anna").await;
+    let (head, _) = guarded.try_login_from(device, "anna", PASSWORD).await;
+    assert!(head.starts_with("HTTP/1.1 204"), "{head}");
+    let again = head.lines().any(|it| it.contains(device));
+    assert!(again, "it keeps its secret: {head}");
+    let (head, _) = guarded.try_login_from(device, "ben", PASSWORD).await;
+    assert!(head.starts_with("HTTP/1.1 429"), "of another user: {head}");
+    let port = guarded.scene.address.port();
+    let file = guarded.folder.path().join(format!("page-{port}.devices"));
+    let (_, secret) = device.split_once('=').unwrap();
+    let kept = std::fs::read_to_string(file).unwrap();
+    assert!(kept.contains(" anna\n") && !kept.contains(secret), "{kept}");
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn guesses_from_three_addresses_keep_the_right_password_from_a_fresh_one_out_for_no_more_than_a_second()
+ {
+    let guarded = Guarded::new().await;
+    let log_in = async |last: u8, password: &str| {
+        let socket = tokio::net::TcpSocket::new_v4().unwrap();
+        socket.bind(([127, 0, 0, last], 0).into()).unwrap();
+        let mut stream = socket.connect(guarded.scene.address).await.unwrap();
+        let body = json!({"name": "anna", "password": password}).to_string();
+        let head = "POST /login HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n";
+        let request = format!("{head}Content-Length: {}\r\n\r\n{body}", body.len());
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = String::new();
+        within_limit(stream.read_to_string(&mut answer))
+            .await
+            .unwrap();
+        answer
+    };
+    for guess in 0..12 {
+        log_in(2 + guess % 3, "wrong").await;
+    }
+    let answer = log_in(9, PASSWORD).await;
+    assert!(answer.starts_with("HTTP/1.1 204"), "{answer}");
+}
+
+#[tokio::test]
+async fn one_who_observes_sees_the_vehicle_and_stops_it_and_does_nothing_else() {
     let guarded = Guarded::new().await;
     let cookie = guarded.login("carl").await;
     let mut page = guarded.page(&cookie).await;
@@ -198,6 +256,7 @@ async fn one_who_observes_sees_the_vehicle_may_stop_it_and_changes_nothing_else(
     for request in [
         json!({"type": "control", "on": true}),
         json!({"type": "emergency", "on": false}),
+        json!({"type": "emergency_all", "on": false}),
         json!({"type": "drive", "forward": 1, "turn": 0}),
         json!({"type": "stop"}),
     ] {
@@ -208,6 +267,8 @@ async fn one_who_observes_sees_the_vehicle_may_stop_it_and_changes_nothing_else(
     page.ask(json!({"type": "emergency", "on": true}))
         .await
         .unwrap();
+    page.until(|state| state["vehicle"]["emergency"] == true)
+        .await;
     let (head, _) = guarded.get("/sessions", &cookie).await;
     assert!(head.starts_with("http/1.1 403"), "{head}");
     until(|| guarded.has_recorded(&["carl", "take control", "refused", "role drive"])).await;

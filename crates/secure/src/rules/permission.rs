@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use jaus::codec::Message as _;
+use jaus::component::CLEAR_ALL;
 use jaus::messages;
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, ConfirmControl, ConfirmElementRequest, ConfirmEventRequest,
@@ -35,6 +36,8 @@ pub(super) enum Permission {
         authority: u8,
     },
     ClearEmergency,
+    /// To clear the emergencies of all clients.
+    ClearAnyEmergency,
     Configure,
     /// All other commands.
     Command,
@@ -48,6 +51,7 @@ impl Permission {
                 // A message without an authority is malformed, and refused as if it asked for all.
                 authority: message.get(2).copied().unwrap_or(u8::MAX),
             },
+            ClearEmergency::CODE if clears_all(message) => Self::ClearAnyEmergency,
             ClearEmergency::CODE => Self::ClearEmergency,
             Shutdown::CODE | Reset::CODE | SetTime::CODE => Self::Configure,
             ReleaseControl::CODE | SetEmergency::CODE | RegisterServices::CODE => Self::Observe,
@@ -56,6 +60,11 @@ impl Permission {
             _ => Self::Observe,
         }
     }
+}
+
+/// Whether a Clear Emergency is for those of all clients.
+pub(crate) fn clears_all(message: &[u8]) -> bool {
+    message.get(2..4) == Some(&CLEAR_ALL.to_le_bytes())
 }
 
 /// Whether the audit log holds each message with this code.

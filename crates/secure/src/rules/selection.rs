@@ -15,6 +15,14 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// The message with this name and code.
+    pub(super) fn of(name: &str, code: u16) -> Self {
+        Self {
+            codes: BTreeSet::from([code]),
+            text: name.to_owned(),
+        }
+    }
+
     /// Whether it selects nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -1,5 +1,6 @@
 use bytes::Bytes;
 use jaus::codec::Message;
+use jaus::component::CLEAR_ALL;
 use jaus::messages::core::{
     ClearEmergency, QueryIdentification, RequestControl, SetEmergency, Shutdown, Standby,
 };
@@ -42,6 +43,15 @@ fn a_key_without_rules_observes_and_may_stop() {
 }
 
 #[test]
+fn a_key_stops_unless_its_line_excepts_it_and_clients_that_nobody_named_do_not() {
+    let stop = SetEmergency::default();
+    assert_eq!(check("observe", &stop), Ok(()));
+    assert_eq!(check("only=PrimitiveDriver", &stop), Ok(()));
+    assert_eq!(check("except=SetEmergency", &stop), Err(Refusal::Excluded));
+    assert_eq!(Rules::watch(), "except=SetEmergency".parse().unwrap());
+}
+
+#[test]
 fn control_is_limited_by_authority() {
     let refused = Refusal::Authority {
         asked: 128,
@@ -59,6 +69,21 @@ fn control_is_limited_by_authority() {
 #[test]
 fn each_further_right_has_its_word() {
     assert_eq!(check("clear-emergency", &ClearEmergency::default()), Ok(()));
+    let all = ClearEmergency {
+        emergency_code: CLEAR_ALL.into(),
+    };
+    assert_eq!(check("clear-emergency=any", &all), Ok(()));
+    assert_eq!(
+        check("clear-emergency=any", &ClearEmergency::default()),
+        Ok(())
+    );
+    for rules in ["", "control=255 configure", "clear-emergency"] {
+        assert!(check(rules, &all).is_err(), "{rules}");
+    }
+    assert_eq!(
+        check("clear-emergency", &all),
+        Err(Refusal::ClearAnyEmergency)
+    );
     assert_eq!(check("configure", &Shutdown), Ok(()));
     assert_eq!(
         check("configure", &SetWrenchEffort::default()),

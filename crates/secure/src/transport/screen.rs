@@ -4,10 +4,10 @@ use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages;
-use jaus::messages::core::{ConfirmControl, confirm_control::ResponseCode};
+use jaus::messages::core::{ClearEmergency, ConfirmControl, confirm_control::ResponseCode};
 use jaus::wire::{Frame, judp};
 
-use crate::rules::Refusal;
+use crate::rules::{Refusal, clears_all};
 use crate::trust::Peer;
 
 /// Why a frame does not pass.
@@ -77,10 +77,17 @@ pub(super) fn confirmed_control(frame: &Frame) -> Option<ResponseCode> {
     decoded.flatten().map(|it| it.response_code)
 }
 
-/// The name of a message, or its code.
-pub(super) fn name_of(code: u16) -> String {
+/// The name of a message, or its code, for people.
+pub(super) fn name_of(frame: &Frame) -> String {
+    let Some(code) = frame.code() else {
+        return "a message".to_owned();
+    };
     let known = messages::registry().by_code(code).next();
-    known.map_or_else(|| format!("{code:04X}h"), |message| message.name.to_owned())
+    let name = known.map_or_else(|| format!("{code:04X}h"), |message| message.name.to_owned());
+    match code == ClearEmergency::CODE && clears_all(&frame.payload) {
+        true => format!("{name} of all clients"),
+        false => name,
+    }
 }
 
 /// One frame of a message that was refused, in words for the peer and the log.
@@ -90,7 +97,7 @@ pub(super) fn sentence(frame: &Frame, refusal: Refusal) -> String {
         destination,
         ..
     } = frame;
-    let name = frame.code().map_or_else(|| "a message".to_owned(), name_of);
+    let name = name_of(frame);
     format!("{name} from {source} to {destination}: {refusal}")
 }
 

@@ -170,7 +170,7 @@ impl Transport {
         let (source, destination) = (frame.source, frame.destination);
         let code = frame.code().unwrap_or_default();
         let message = |refusal| Act::Message {
-            name: screen::name_of(code),
+            name: screen::name_of(frame),
             source,
             destination,
             refusal,

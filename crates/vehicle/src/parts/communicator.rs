@@ -8,19 +8,14 @@
 use std::collections::BTreeSet;
 use std::convert::Infallible;
 use std::future::pending;
-use std::net::SocketAddr;
 
 use super::{Part, PartError, Slot};
 use crate::messages;
 use jaus::component::{Component, Watch};
 use jaus::endpoint::{Event, Remote};
 use jaus::node::{ComponentEvents, Events, Node};
-use jaus_view::debug::{self, DebugView};
+use jaus_view::debug::{DebugAddress, DebugListener, DebugView};
 use jaus_view::{Dictionary, Journal, JournalSettings, tree};
-
-/// Default address of the debug view.
-pub const DEBUG_ADDRESS: SocketAddr =
-    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 8794);
 
 /// Limit on individually logged ID conflicts, since an attacker may invent any number.
 const MOST_CONFLICTS: usize = 256;
@@ -31,7 +26,7 @@ const MOST_CONFLICTS: usize = 256;
 #[derive(Debug, Clone, Default)]
 pub struct Communicator {
     /// Address of the debug view, if it is served.
-    pub debug: Option<SocketAddr>,
+    pub debug: Option<DebugAddress>,
     /// Other nodes of this process, whose messages the debug view shows too.
     pub beside: Vec<Node>,
     /// Whether failure to open the debug view is an error.
@@ -79,9 +74,9 @@ impl Communicator {
         node: &Node,
         component: &Component,
     ) -> Result<impl Future<Output = std::io::Error> + use<>, PartError> {
-        let listener = match self.debug {
+        let listener = match &self.debug {
             None => None,
-            Some(address) => match debug::listen(address).await {
+            Some(address) => match address.listen().await {
                 Ok(listener) => Some(listener),
                 Err(error) if self.debug_is_needed => {
                     return Err(PartError::Broken(format!(
@@ -94,8 +89,13 @@ impl Communicator {
                 }
             },
         };
-        if let Some(address) = listener.as_ref().and_then(|l| l.local_addr().ok()) {
-            tracing::info!("debug view: ws://{address}/messages, http://{address}/tree");
+        match listener.as_ref().and_then(DebugListener::address) {
+            Some(DebugAddress::Tcp(address)) => {
+                tracing::info!("debug view: ws://{address}/messages, http://{address}/tree");
+                tracing::warn!("everyone who reaches {address} can read all messages");
+            }
+            Some(address) => tracing::info!("debug view: {address}"),
+            None => {}
         }
         let nodes = std::iter::once(node).chain(&self.beside).cloned();
         let view = DebugView::new(nodes, component.clone(), dictionary());

@@ -38,7 +38,7 @@ use jaus::service::{Time, TimeOfDay};
 
 use drivers::ChainGuard;
 
-pub use communicator::{Communicator, DEBUG_ADDRESS};
+pub use communicator::Communicator;
 pub use global_driver::GlobalDriver;
 pub use global_pose_sensor::{GlobalPoseSensor, NavigationInputs};
 #[cfg(all(feature = "can", target_os = "linux"))]

@@ -200,8 +200,8 @@ impl Running {
         }
     }
 
-    /// Keeps the component in emergency while the stop input is open, and clears all emergencies
-    /// when it is closed.
+    /// Keeps the component in an emergency of its own while the stop input is open. Emergencies of
+    /// clients remain when it is closed.
     async fn check_stop(&mut self) {
         let Some(stop) = &mut self.stop else {
             return;
@@ -212,18 +212,20 @@ impl Running {
             let why = open.as_deref().unwrap_or("the stop input was pressed");
             tracing::warn!("emergency: {why}");
             self.stopped = true;
+            self.vehicle.stop();
+            self.component.set_condition(Condition::Stopped).await;
+            return;
         }
         if !self.stopped {
             return;
         }
         if self.component.standing().state != State::Emergency {
+            // The application has declared it safe, or the state is not reported yet.
             self.vehicle.stop();
-            if let Err(error) = self.component.set_emergency(self.component.id()).await {
-                tracing::warn!("cannot set the emergency, will retry: {error}");
-            }
+            self.component.set_condition(Condition::Stopped).await;
         } else if open.is_none() {
-            tracing::warn!("the stop input is closed again: all emergencies are cleared");
-            self.component.set_condition(Condition::Safe).await;
+            tracing::warn!("the stop input is closed again: its emergency ends");
+            self.component.set_condition(Condition::StopReleased).await;
             self.stopped = false;
             // The component must be resumed before anything moves.
             self.interlock.close();

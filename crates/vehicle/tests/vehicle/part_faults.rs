@@ -173,7 +173,7 @@ async fn a_fault_of_the_steering_stops_the_drive_and_is_a_failure() {
 
 // In real time, as the thread that reads the stop input is.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
+async fn a_stop_input_is_an_emergency_and_its_release_ends_its_own_alone() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| {
         let motor = SimulatedMotor::new(MotorConfig::default());
@@ -200,10 +200,15 @@ async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
     scene
         .until_state(PRIMITIVE, State::Emergency, &control, &ahead())
         .await;
-    // A second emergency; the client that set it does not clear it.
+    // A second emergency, of a client.
     scene.client.set_emergency(PRIMITIVE).await.unwrap();
     let before = scene.comes_to_rest().await;
     button.release();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    scene
+        .until_state(PRIMITIVE, State::Emergency, &control, &ahead())
+        .await;
+    scene.client.clear_emergency(PRIMITIVE).await.unwrap();
     scene
         .until_state(PRIMITIVE, State::Standby, &control, &ahead())
         .await;

@@ -2,7 +2,13 @@
 
 use super::super::management::MOST_EMERGENCIES;
 use super::*;
+use crate::endpoint::{LinkId, Path, Remote, SessionId as PeerSession};
 use crate::service::code_of;
+use crate::service::control::CLEAR_ALL;
+
+const CLEAR_OF_ALL: ClearEmergency = ClearEmergency {
+    emergency_code: clear_emergency::EmergencyCode(CLEAR_ALL),
+};
 
 #[test]
 fn anybody_can_set_an_emergency_and_only_the_same_client_clears_it() {
@@ -66,6 +72,72 @@ fn the_application_can_end_the_emergencies_of_clients_that_are_gone() {
         rig.stack.set_condition(rig.now, Condition::Safe);
         assert_eq!(rig.state(), state, "there was none");
     }
+}
+
+#[test]
+fn the_component_s_own_stop_ends_alone_and_no_client_clears_it() {
+    let mut rig = Rig::ready();
+    rig.stack.set_condition(rig.now, Condition::Stopped);
+    assert_eq!(rig.state(), State::Emergency);
+    let us = rig.stack.id();
+    for client in [FIRST, us] {
+        rig.hear(client, &CLEAR);
+        rig.hear(client, &CLEAR_OF_ALL);
+        assert_eq!(rig.state(), State::Emergency, "{client}");
+    }
+    rig.hear(THIRD, &STOP);
+    rig.stack.set_condition(rig.now, Condition::StopReleased);
+    assert_eq!(rig.state(), State::Emergency, "THIRD has set one");
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+
+    rig.hear(THIRD, &STOP);
+    rig.stack.set_condition(rig.now, Condition::Stopped);
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency, "the stop is not released");
+    rig.stack.set_condition(rig.now, Condition::StopReleased);
+    assert_eq!(rig.state(), State::Standby);
+    rig.stack.set_condition(rig.now, Condition::StopReleased);
+    assert_eq!(rig.state(), State::Standby, "there was none");
+}
+
+#[test]
+fn the_emergencies_of_all_clients_are_cleared_by_a_checked_client_alone() {
+    let on = |peer| {
+        let link = LinkId(0);
+        Some(Path { link, peer })
+    };
+    let plain = Remote::Socket(([10, 0, 0, 1], 3794).into());
+    for (path, expected) in [
+        (on(plain), State::Emergency),
+        (on(Remote::Line), State::Emergency),
+        (on(Remote::Session(PeerSession(7))), State::Standby),
+        (None, State::Standby),
+    ] {
+        let mut rig = Rig::ready();
+        rig.hear(THIRD, &STOP);
+        rig.hear_on(path, SECOND, &CLEAR);
+        assert_eq!(rig.state(), State::Emergency, "SECOND has set none");
+        rig.hear_on(path, SECOND, &CLEAR_OF_ALL);
+        assert_eq!(rig.state(), expected, "{path:?}");
+    }
+}
+
+#[test]
+fn a_command_in_place_of_a_subscription_s_query_does_nothing() {
+    let mut rig = Rig::ready();
+    rig.hear(THIRD, &STOP);
+    let create = CreateEvent {
+        query_message: CLEAR_OF_ALL.encode().unwrap(),
+        ..CreateEvent::default()
+    };
+    let link = LinkId(0);
+    let path = Path {
+        link,
+        peer: Remote::Line,
+    };
+    rig.hear_on(Some(path), SECOND, &create);
+    assert_eq!(rig.state(), State::Emergency);
 }
 
 #[test]
@@ -138,6 +210,24 @@ fn a_setter_that_finds_the_table_full_is_noted_until_the_client_in_control_clear
         rig.hear(setter(i), &CLEAR);
     }
     assert_eq!(rig.state(), State::Emergency, "one more has set it");
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn emergencies_beyond_the_table_are_cleared_by_a_client_that_takes_control_for_it() {
+    let mut rig = Rig::managed();
+    for i in 0..=MOST {
+        rig.hear(setter(i), &STOP);
+    }
+    let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
+    assert_eq!(rig.request(FIRST, 100), [refused], "the setters are alive");
+    for i in 0..=MOST {
+        rig.hear(setter(i), &CLEAR);
+    }
+    assert_eq!(rig.state(), State::Emergency, "one was not held");
+    let granted = confirmed(FIRST, Confirmation::CONTROL_ACCEPTED);
+    assert_eq!(rig.request(FIRST, 100), [granted]);
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Standby);
 }

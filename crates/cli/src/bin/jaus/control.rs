@@ -73,6 +73,8 @@ enum Action {
     Emergency,
     /// Clear the emergency
     Clear,
+    /// Clear the emergencies of all clients, which requires the right `clear-emergency=any`
+    ClearAll,
     /// Release control
     Release,
 }
@@ -143,6 +145,15 @@ impl Operator<'_> {
                 self.tell("emergency", format_args!("{peer} is in emergency"))
             }
             Action::Clear => self.clear().await,
+            Action::ClearAll => {
+                let cleared = self.component.clear_all_emergencies(peer).await;
+                cleared.map_err(Failure::negative)?;
+                self.expect_no_emergency(
+                    "over a secure link with the right clear-emergency=any, or from the peer's \
+                     node, unless its stop input is pressed",
+                )
+                .await
+            }
             Action::Release => self.release().await,
         }
     }
@@ -156,16 +167,31 @@ impl Operator<'_> {
             }
             let cleared = self.component.clear_emergency(peer).await;
             cleared.map_err(Failure::negative)?;
-            let status = self.component.query(peer, &QueryStatus {}).await;
-            let code = status.map_err(Failure::negative)?.status.0;
-            if State::from_code(code) != Some(State::Emergency) {
-                return self.tell("clear", format_args!("{peer} is in no emergency"));
+            if !self.is_in_emergency().await? {
+                break;
             }
         }
-        Err(Failure::negative(format_args!(
-            "{peer} is still in emergency: clear it as the client that has set it (--id), or once that \
-             client has been gone for 4 s"
-        )))
+        self.expect_no_emergency(
+            "as the client that has set it (--id), once that client has been gone for 4 s, or with \
+             clear-all",
+        )
+        .await
+    }
+
+    async fn is_in_emergency(&self) -> Result<bool, Failure> {
+        let status = self.component.query(self.command.address, &QueryStatus {});
+        let code = status.await.map_err(Failure::negative)?.status.0;
+        Ok(State::from_code(code) == Some(State::Emergency))
+    }
+
+    /// Reports the end of the emergency, or else how it can be cleared.
+    async fn expect_no_emergency(&mut self, how: &str) -> Result<(), Failure> {
+        let peer = self.command.address;
+        if self.is_in_emergency().await? {
+            let words = format_args!("{peer} is still in emergency: clear it {how}");
+            return Err(Failure::negative(words));
+        }
+        self.tell("clear", format_args!("{peer} is in no emergency"))
     }
 
     /// The session; begins it if there is none.

@@ -58,7 +58,7 @@ fn start(test: u8, at: &str, file: &MapFile) -> (Running, Running, Browser) {
 
 fn station(test: u8, file: &std::path::Path) -> (Running, Browser) {
     let flags = ["--listen", "127.0.0.1:0", "--map", file.to_str().unwrap()];
-    let (station, address) = Running::start(test, "jaus-ocu", &flags, "page is at ");
+    let (station, address) = Running::station(test, &flags);
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
     page.open(&address);

@@ -2,6 +2,7 @@
 //! this host.
 
 use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use super::browser::{Browser, SCREENS};
@@ -14,6 +15,13 @@ use super::system::program;
 /// The number of this test's multicast group.
 const TEST: u8 = 2;
 
+/// What stations keep is the tests' own, and not the user's.
+fn state_folder() -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("e2e-state");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
 /// A process; killed when dropped.
 pub(crate) struct Running(Child);
 
@@ -24,6 +32,7 @@ impl Running {
         let group = Self::group(test);
         let mut command = Command::new(program(name));
         command.args(flags).args(["--loopback", "--group", &group]);
+        command.env("STATE_DIRECTORY", state_folder());
         let mut child = command
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -55,6 +64,11 @@ impl Running {
 }
 
 impl Running {
+    /// Starts a station. Returns the address that its operator opens, with the token.
+    pub(crate) fn station(test: u8, flags: &[&str]) -> (Self, String) {
+        Self::start(test, "jaus-ocu", flags, "to control vehicles, open ")
+    }
+
     /// The multicast group of a test.
     pub(crate) fn group(test: u8) -> String {
         let port = 20_000 + std::process::id() % 40_000;
@@ -81,12 +95,7 @@ impl Drop for Running {
 /// when the station is lost, and that the page connects to the next station.
 pub(crate) fn run() {
     let (vehicle, _) = Running::start(TEST, "jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
-    let (station, address) = Running::start(
-        TEST,
-        "jaus-ocu",
-        &["--listen", "127.0.0.1:0"],
-        "page is at ",
-    );
+    let (station, address) = Running::station(TEST, &["--listen", "127.0.0.1:0"]);
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
     page.open(&address);
@@ -110,22 +119,14 @@ pub(crate) fn run() {
     page.let_go();
     emergency(&mut page);
 
-    let port = address
-        .trim_end_matches('/')
-        .rsplit(':')
-        .next()
-        .unwrap()
-        .to_owned();
+    // The next station has the same token, so the page is trusted again.
+    let (place, _) = address.split_once("/#token=").unwrap();
+    let (_, listen) = place.split_once("http://").unwrap();
     drop(station);
     page.wait("document.body.dataset.link === 'lost'");
     page.screenshot("by-hand-lost");
     is_announced(&mut page, "No connection");
-    let (_station, _) = Running::start(
-        TEST,
-        "jaus-ocu",
-        &["--listen", &format!("127.0.0.1:{port}")],
-        "page is at ",
-    );
+    let (_station, _) = Running::station(TEST, &["--listen", listen]);
     page.wait("document.body.dataset.link === 'live'");
     take_control(&mut page);
     refuses_to_drive_without_news(&mut page, &vehicle);

@@ -33,7 +33,7 @@ pub(crate) fn run() {
         "--vehicle",
         "102",
     ];
-    let (_station, address) = Running::start(TEST, "jaus-ocu", &station, "page is at ");
+    let (_station, address) = Running::station(TEST, &station);
     let mut page = Browser::start(None);
     page.look_on(screen("tablet"));
     page.open(&address);

@@ -10,7 +10,7 @@ const TEST: u8 = 4;
 /// Starts a station, and a browser that shows its page.
 fn operator(id: &str) -> (Running, Browser) {
     let flags = ["--id", id, "--listen", "127.0.0.1:0"];
-    let (station, address) = Running::start(TEST, "jaus-ocu", &flags, "page is at ");
+    let (station, address) = Running::station(TEST, &flags);
     let mut page = Browser::start(None);
     page.look_on(SCREENS[0]);
     page.open(&address);

@@ -122,12 +122,7 @@ const ENDINGS: [Ending; 9] = [
 
 pub(crate) fn run() {
     let (_vehicle, _) = Running::start(TEST, "jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
-    let (_station, address) = Running::start(
-        TEST,
-        "jaus-ocu",
-        &["--listen", "127.0.0.1:0"],
-        "page is at ",
-    );
+    let (_station, address) = Running::station(TEST, &["--listen", "127.0.0.1:0"]);
     let mut page = Browser::start(None);
     let page = &mut page;
     page.look_on(SCREENS[0]);

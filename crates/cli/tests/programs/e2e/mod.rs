@@ -105,7 +105,7 @@ fn control_is_handed_over_between_the_pages_of_two_operators() {
 }
 
 #[test]
-fn a_page_without_the_token_asks_for_it_where_it_would_stop_the_vehicle() {
+fn a_page_without_the_token_asks_for_it_or_where_it_may_look_stops_the_vehicle() {
     on_a_station(watching::run);
 }
 

@@ -42,7 +42,11 @@ const PROGRAMS: [(&str, Host, &[&str]); 9] = [
     ("jaus-local-vector-driver", Host::BoardB, &[]),
     ("jaus-local-path-segment-driver", Host::BoardB, &[]),
     ("jaus-planner", Host::BoardB, &[]),
-    ("jaus-ocu", Host::Operator, &["--listen", "127.0.0.1:8080"]),
+    (
+        "jaus-ocu",
+        Host::Operator,
+        &["--listen", "127.0.0.1:8080", "--unprotected"],
+    ),
 ];
 
 /// Programs that have not been built; the system needs all of them.

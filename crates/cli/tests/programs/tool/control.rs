@@ -51,7 +51,8 @@ fn while_it_holds_it_takes_actions_from_its_input() {
     for event in ["standby", "ready", "emergency", "clear", "released"] {
         assert!(rest.any(|it| *it == event), "{event} in {events:?}");
     }
-    let advice = "no action \"warp\": write hold, resume, standby, emergency, clear, release";
+    let advice =
+        "no action \"warp\": write hold, resume, standby, emergency, clear, clear-all, release";
     assert!(held.stderr.contains(advice), "{held:?}");
     assert_eq!(held.status, 0);
 }

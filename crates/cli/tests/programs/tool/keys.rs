@@ -108,6 +108,48 @@ fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
 }
 
 #[test]
+fn an_emergency_of_another_client_is_cleared_by_a_key_with_the_right_alone() {
+    let (_vehicle, at_vehicle, operator, address) = vehicle_and_operator("115.1.7");
+    let viewer = Host::new();
+    at_vehicle.trust("viewer", &viewer.new_key(), "61.255.255");
+    let shown = at_vehicle.keys(&["show"]);
+    viewer.trust("rover", shown.stdout.trim(), "115.255.255");
+    let control = |host: &Host, id: &str, action: &str| {
+        let command = ["control", "115.1.7", action, "--id", id, "--timeout", "2s"];
+        as_operator(host, &address, &command)
+    };
+    // A running node applies a change within two seconds.
+    let applied = || std::thread::sleep(std::time::Duration::from_secs(3));
+    applied();
+    let allow = |name: &str, rules: &[&str]| {
+        let allowed = at_vehicle.keys(&[&["allow", name], rules].concat());
+        assert_eq!(allowed.status, 0, "{allowed:?}");
+        applied();
+    };
+    let stopped = control(&viewer, "61.1.1", "emergency");
+    assert_eq!(stopped.status, 0, "{stopped:?}");
+
+    allow("operator", &["control=200", "clear-emergency"]);
+    let refused = control(&operator, "60.1.1", "clear-all");
+    assert_eq!(refused.status, 1, "{refused:?}");
+    assert!(
+        refused.stderr.contains("clear-emergency=any"),
+        "{refused:?}"
+    );
+    allow("operator", &["control=200", "clear-emergency=any"]);
+    let cleared = control(&operator, "60.1.1", "clear-all");
+    assert_eq!(cleared.status, 0, "{cleared:?}");
+
+    allow("viewer", &["observe", "except=SetEmergency"]);
+    let refused = control(&viewer, "61.1.1", "emergency");
+    assert_ne!(refused.status, 0, "{refused:?}");
+    let audit = std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    let entries: Vec<_> = audit.lines().filter(|it| it.contains("of all")).collect();
+    let has = |result: &str| entries.iter().any(|it| it.contains(result));
+    assert!(has("allowed") && has("refused"), "{audit}");
+}
+
+#[test]
 fn two_commands_on_each_host_give_a_vehicle_and_an_operator() {
     let (vehicle, operator) = (Host::new(), Host::new());
     let (vehicle_key, operator_key) = (vehicle.new_key(), operator.new_key());

@@ -106,6 +106,7 @@ fn no_log_level_shows_a_password_or_a_cookie() {
         .args(["--listen", "127.0.0.1:0", "--users", &host.file("users")])
         .args(own_group())
         .env("JAUS_LOG", "trace")
+        .env("STATE_DIRECTORY", host.0.path())
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(fs::File::create(&log).unwrap())
@@ -146,7 +147,7 @@ fn a_users_file_that_cannot_be_used_is_refused_with_the_remedy() {
     let missing = host.refused_station(&flags);
     assert!(missing.contains("--users"), "{missing}");
     host.add("anna", "drive");
-    let both = host.refused_station(&["--users", &users, "--token-to-read"]);
+    let both = host.refused_station(&["--users", &users, "--watch-without-token"]);
     assert!(both.contains("cannot be used with"), "{both}");
     host.users(&["remove", "anna"], "");
     let empty = host.refused_station(&flags);

@@ -227,7 +227,7 @@ impl Demo {
         start_part(system, story, &mind, 36, "planner", self.planner())?;
         if !self.headless {
             let station = Station::default().open().await.map_err(Failure::of)?;
-            let urls = station.urls();
+            let urls = station.secret_urls();
             start_part(system, story, &console, 1, "operator's page", station)?;
             for url in urls {
                 story.tell(Who::Operator, format_args!("the page is at {url}"))?;

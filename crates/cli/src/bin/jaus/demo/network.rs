@@ -2,11 +2,11 @@
 //! the same host, whose components have the same ids.
 
 use std::fs::File;
-use std::net::{SocketAddr, SocketAddrV4};
+use std::net::SocketAddrV4;
 
 use jaus::link::{Group, STANDARD_GROUP};
 use jaus_cli::failure::Failure;
-use jaus_vehicle::parts::DEBUG_ADDRESS;
+use jaus_view::debug::DebugAddress;
 
 /// The operator's subsystem.
 pub(super) const OPERATOR: u16 = 42;
@@ -54,9 +54,8 @@ impl OwnNetwork {
     }
 
     /// The address of the debug view.
-    pub(super) fn debug(&self) -> SocketAddr {
-        let port = DEBUG_ADDRESS.port() + self.number;
-        SocketAddr::new(DEBUG_ADDRESS.ip(), port)
+    pub(super) fn debug(&self) -> DebugAddress {
+        DebugAddress::usual(self.number)
     }
 
     /// The flags by which other commands join this network.

@@ -2,7 +2,6 @@
 //! on loopback. The parts are those of the programs `jaus-…`.
 
 use std::convert::Infallible;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::{fs, process};
 
@@ -13,6 +12,7 @@ use jaus::node::{Config, Node};
 use jaus_cli::failure::Failure;
 use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
 use jaus_vehicle::sensing::Scenery;
+use jaus_view::debug::DebugAddress;
 use tokio::task::JoinSet;
 
 use super::network::{OPERATOR, OwnNetwork};
@@ -93,8 +93,8 @@ impl System {
         self.network.watch_flags()
     }
 
-    /// Where the debug view is served, unless another program uses the port.
-    pub(super) fn debug_address(&self) -> SocketAddr {
+    /// Where the debug view is served, unless another program serves one there.
+    pub(super) fn debug_address(&self) -> DebugAddress {
         self.network.debug()
     }
 

@@ -4,11 +4,12 @@
 //! `jaus up`. [`leash`](super::leash) runs between the fork and the program.
 
 use std::fs;
-use std::io::{self, PipeReader};
+use std::io::{self, IsTerminal, PipeReader};
 use std::os::fd::OwnedFd;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child as Process, Command, Stdio};
 
+use jaus_cli::output::OUTPUT_IS_LOG;
 use nix::errno::Errno;
 use nix::sys::signal::{Signal, killpg};
 use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
@@ -50,6 +51,9 @@ impl Child {
             .stdout(writer.try_clone()?)
             .stderr(writer)
             .process_group(0);
+        if !io::stdout().is_terminal() {
+            command.env(OUTPUT_IS_LOG, "1");
+        }
         if let Some(directory) = &part.directory {
             command.current_dir(directory);
         }

@@ -13,6 +13,7 @@ use jaus_view::Filter;
 use jaus_viewers::{Channels, MOST_CHANNELS, Server, ServerSettings};
 use tokio::net::TcpListener;
 
+use crate::debug_view::usual_address;
 use crate::definitions::Definitions;
 use source::Source;
 
@@ -40,9 +41,10 @@ pub(crate) struct View {
     #[arg(long, value_name = "ORIGIN")]
     origin: Vec<String>,
 
-    /// The address of a debug view
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8794")]
-    at: String,
+    /// The address of a debug view: the path of its socket, or ADDRESS:PORT [default: that of this
+    /// user's communicator]
+    #[arg(long, value_name = "ADDRESS")]
+    at: Option<String>,
 
     /// Serve what passes on this network interface, by name or address, instead of a debug view
     /// (repeatable); `all` for all of them, including loopback
@@ -119,7 +121,8 @@ impl View {
         dictionary: &'d jaus_view::Dictionary,
     ) -> Result<Source<'d>, Failure> {
         if self.interface.is_empty() {
-            return Source::debug_view(&self.at, dictionary).await;
+            let at = self.at.clone().unwrap_or_else(usual_address);
+            return Source::debug_view(&at, dictionary).await;
         }
         let chosen: &[String] = match self.interface.iter().any(|name| name == "all") {
             true => &[],

@@ -15,6 +15,7 @@ use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
 use jaus_view::{Dictionary, Entry, Filter};
 
+use crate::debug_view::usual_address;
 use crate::definitions::Jsidl;
 use tally::Tally;
 
@@ -45,14 +46,10 @@ pub(crate) struct Watch {
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
 
-    /// The address of a debug view
-    #[arg(
-        long,
-        value_name = "ADDRESS",
-        default_value = "127.0.0.1:8794",
-        conflicts_with = "files"
-    )]
-    at: String,
+    /// The address of a debug view: the path of its socket, or ADDRESS:PORT [default: that of this
+    /// user's communicator]
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "files")]
+    at: Option<String>,
 
     /// Watch this network interface, by name or address, instead of a debug view (repeatable);
     /// `all` for all of them, including loopback
@@ -148,7 +145,8 @@ impl Watch {
         let limit = self.duration;
         if self.interface.is_empty() {
             let filters_here = self.jsidl.is_given();
-            return live::watch(&self.at, filter, filters_here, limit, printer);
+            let at = self.at.clone().unwrap_or_else(usual_address);
+            return live::watch(&at, filter, filters_here, limit, printer);
         }
         let chosen: &[String] = match self.interface.iter().any(|name| name == "all") {
             true => &[],
