@@ -1,6 +1,6 @@
-//! A headless Chromium, controlled through its DevTools protocol over a pipe: it needs no driver
-//! program and no port, and runs in a network namespace. User actions are real input events:
-//! touches and key presses.
+//! Chromium, controlled through its DevTools protocol over a pipe: it needs no driver program and no
+//! port, and runs in a network namespace, headless or on a display. User actions are real input
+//! events: touches and key presses.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -77,6 +77,10 @@ pub(crate) struct Browser {
     said: Receiver<Value>,
     held_key: Option<HeldKey>,
     session: Option<String>,
+    /// Id of the controlled tab.
+    tab: Value,
+    /// Ids of all tabs that were opened here.
+    tabs: Vec<Value>,
     number: u64,
     profile: PathBuf,
     complaints: Vec<String>,
@@ -85,8 +89,17 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Starts the browser, in a network namespace if one is given.
+    /// Starts a headless browser, in a network namespace if one is given.
     pub(crate) fn start(network: Option<&str>) -> Self {
+        Self::start_with(network, &["--headless=new"], &[])
+    }
+
+    /// Starts a browser with flags and variables of its environment.
+    pub(crate) fn start_with(
+        network: Option<&str>,
+        flags: &[&str],
+        environment: &[(&str, &str)],
+    ) -> Self {
         let number = BROWSERS.fetch_add(1, Ordering::Relaxed);
         let profile = format!("chromium-{}-{number}", std::process::id());
         let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join(profile);
@@ -104,12 +117,8 @@ impl Browser {
             "exec chromium \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1",
             "sh",
         ]);
-        command.args([
-            "--headless=new",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--remote-debugging-pipe",
-        ]);
+        command.args(flags).envs(environment.iter().copied());
+        command.args(["--no-sandbox", "--disable-gpu", "--remote-debugging-pipe"]);
         command.args([
             "--no-first-run",
             "--disable-extensions",
@@ -147,28 +156,69 @@ impl Browser {
             said,
             held_key: None,
             session: None,
+            tab: Value::Null,
+            tabs: Vec::new(),
             number: 0,
             profile,
             complaints: Vec::new(),
             failures: Vec::new(),
         };
-        browser.attach();
+        browser.open_tab();
         browser
     }
 
-    fn attach(&mut self) {
-        let target = self.call("Target.createTarget", &json!({ "url": "about:blank" }));
-        let target = json!({ "targetId": target["targetId"], "flatten": true });
-        let session = self.call("Target.attachToTarget", &target);
+    /// Opens a tab in front of the others, and controls it from now on.
+    pub(crate) fn open_tab(&mut self) {
+        self.tab = self.cover_tab();
+        let target = json!({ "targetId": self.tab, "flatten": true });
+        let session = self.call_browser("Target.attachToTarget", &target);
         self.session = Some(session["sessionId"].as_str().unwrap().to_owned());
         for domain in ["Runtime", "Log", "Page"] {
             self.call(&format!("{domain}.enable"), &json!({}));
         }
     }
 
+    /// Opens an empty tab in front of the controlled one. Returns its id.
+    pub(crate) fn cover_tab(&mut self) -> Value {
+        let blank = json!({ "url": "about:blank" });
+        let tab = self.call_browser("Target.createTarget", &blank)["targetId"].clone();
+        self.tabs.push(tab.clone());
+        tab
+    }
+
+    /// Closes every tab that was opened here.
+    pub(crate) fn close_tabs(&mut self) {
+        self.session = None;
+        for tab in std::mem::take(&mut self.tabs) {
+            // It may be closed already.
+            let _ = self.try_call("Target.closeTarget", &json!({ "targetId": tab }));
+        }
+    }
+
+    /// Closes the controlled tab.
+    pub(crate) fn close_tab(&mut self) {
+        let tab = json!({ "targetId": self.tab });
+        self.call_browser("Target.closeTarget", &tab);
+    }
+
+    /// Kills the browser with all its processes.
+    pub(crate) fn kill(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// Sends a command to the browser rather than to the tab.
+    #[track_caller]
+    fn call_browser(&mut self, method: &str, parameters: &Value) -> Value {
+        let session = self.session.take();
+        let answer = self.call(method, parameters);
+        self.session = session;
+        answer
+    }
+
     /// Sends a command and waits for its answer.
     #[track_caller]
-    fn call(&mut self, method: &str, parameters: &Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, parameters: &Value) -> Value {
         let answer = self.try_call(method, parameters);
         answer.unwrap_or_else(|error| panic!("{method}: {error}"))
     }
