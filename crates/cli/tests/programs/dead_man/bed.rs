@@ -7,7 +7,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime};
 
 use jaus_test_kit::hosts::{add_host, ip, on_host};
 use jaus_test_kit::waiting::block_until;
@@ -36,7 +36,7 @@ pub(crate) struct Bed {
     pub(crate) display: Display,
     names: [String; 2],
     // After the relay and the display, which use its hosts.
-    _system: System,
+    system: System,
     _token: tempfile::NamedTempFile,
 }
 
@@ -64,7 +64,7 @@ impl Bed {
             motors,
             display: Display::start(&names[0])?,
             names,
-            _system: system,
+            system,
             _token: token,
         })
     }
@@ -72,6 +72,20 @@ impl Bed {
     /// The address of the page, with the token.
     pub(crate) fn page(&self) -> String {
         format!("http://{STATION}:8080/#token={TOKEN}")
+    }
+
+    /// How long after this time the primitive driver's last emergency began.
+    pub(crate) fn emergency_after(&self, time: SystemTime) -> Option<Duration> {
+        let log = self.system.log("jaus-primitive-driver");
+        let line = log.lines().rfind(|it| it.contains("the state is emergency"))?;
+        // For example 2026-11-28T04:51:04.346374Z.
+        let (_, clock) = line.split_once('T')?;
+        let mut parts = clock.split_once('Z')?.0.split(':').map(str::parse::<f64>);
+        let mut part = || parts.next()?.ok();
+        let began = part()? * 3600.0 + part()? * 60.0 + part()?;
+        let since_1970 = time.duration_since(SystemTime::UNIX_EPOCH).ok()?;
+        let time = since_1970.as_secs_f64() % 86_400.0;
+        Some(Duration::from_secs_f64((began - time).rem_euclid(86_400.0)))
     }
 
     /// A browser on the display.
@@ -165,11 +179,11 @@ impl Drop for Display {
 
 /// Waits until a condition holds, but not longer than `limit`.
 pub(crate) fn within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
-    let deadline = std::time::Instant::now() + limit;
+    let deadline = Instant::now() + limit;
     let mut held = false;
     block_until(|| {
         held = holds();
-        held || std::time::Instant::now() > deadline
+        held || Instant::now() > deadline
     });
     held
 }

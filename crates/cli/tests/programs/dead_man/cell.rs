@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use super::bed::{BothWays, CLEAR};
 use super::motor::Stopped;
@@ -138,6 +138,8 @@ pub(crate) struct Cell {
     pub(crate) ending: Ending,
     pub(crate) limit: Duration,
     is_refused: bool,
+    /// When an emergency stop of a vehicle that stood already was in force.
+    emergency: Option<Duration>,
     /// What the page said about driving at the end.
     pub(crate) line: String,
 }
@@ -152,7 +154,10 @@ impl Cell {
         let is_in_time = |it: &Stopped| it.command.is_some_and(|time| time <= self.limit);
         match &self.ending {
             Ending::Stopped(stopped) => !self.is_refused && is_in_time(stopped),
-            Ending::StoppedBefore(stopped) => stopped.command.is_some_and(|time| time <= DEAD_MAN),
+            Ending::StoppedBefore(stopped) => {
+                stopped.command.is_some_and(|time| time <= DEAD_MAN)
+                    && self.emergency.is_none_or(|time| time <= self.limit)
+            }
             Ending::Refused => true,
         }
     }
@@ -177,7 +182,11 @@ impl fmt::Display for Cell {
             seconds(stopped.rest),
             stopped.speed,
             stopped.metres
-        )
+        )?;
+        match self.emergency {
+            Some(time) => write!(f, "; emergency {:.2} s", time.as_secs_f64()),
+            None => Ok(()),
+        }
     }
 }
 
@@ -208,11 +217,14 @@ impl<'a> Measurement<'a> {
     pub(crate) fn stop(&mut self, source: Source, stop: Stop, link: Link, held: Duration) -> Cell {
         let name = format!("{}, {stop:?} after {} s, {}", source.name(), held.as_secs(), link.name);
         let limit = link.emergency_limit();
-        let mut cell = self.measure(name, limit, source, link, held, |it| it.stop(stop));
-        self.bed.link.set(CLEAR);
-        self.operator.recover();
-        if !self.operator.sees_emergency() {
-            cell.line = format!("no emergency: {}", cell.line);
+        let mut pressed = SystemTime::now();
+        let mut cell = self.measure(name, limit, source, link, held, |it| {
+            pressed = SystemTime::now();
+            it.stop(stop)
+        });
+        self.emergency_is_seen();
+        if let Ending::StoppedBefore(_) = cell.ending {
+            cell.emergency = self.bed.emergency_after(pressed);
         }
         cell
     }
@@ -235,9 +247,14 @@ impl<'a> Measurement<'a> {
         let ending = Ending::Stopped(self.bed.motors.stopped(event));
         // Nothing reaches the vehicle over a cut link: its mission goes on, as it was approved.
         let cell = self.finish(name, link.emergency_limit(), link, ending);
-        self.bed.link.set(CLEAR);
-        self.operator.sees_emergency();
+        self.emergency_is_seen();
         cell
+    }
+
+    /// Waits until the vehicle is in emergency, over a free link.
+    fn emergency_is_seen(&mut self) {
+        self.bed.link.set(CLEAR);
+        assert!(self.operator.sees_emergency(), "the emergency is repeated until the vehicle confirms it");
     }
 
     fn measure(
@@ -259,7 +276,7 @@ impl<'a> Measurement<'a> {
             false => String::new(),
         };
         self.operator.recover();
-        let cell = Cell { name, ending, limit, is_refused: link.is_refused, line };
+        let cell = Cell { name, ending, limit, is_refused: link.is_refused, emergency: None, line };
         println!("{}: {cell} (limit {:.2} s) [{}]", cell.name, limit.as_secs_f64(), cell.line);
         cell
     }
@@ -285,13 +302,13 @@ impl<'a> Measurement<'a> {
         // A lossy link may end a drive at any time: the event comes as long as it lasts.
         let held = if link.conditions[0].loss > 0 { held.min(Duration::from_millis(700)) } else { held };
         sleep(held);
-        if is_free && !self.bed.motors.drive() {
-            sleep(WATCH);
-            return Ending::StoppedBefore(self.bed.motors.stopped(changed));
-        }
+        let has_stopped = is_free && !self.bed.motors.drive();
         set(Begins::WithEvent);
         let event = happen(&mut self.operator);
         sleep((event + WATCH).saturating_duration_since(Instant::now()));
-        Ending::Stopped(self.bed.motors.stopped(event))
+        match has_stopped {
+            true => Ending::StoppedBefore(self.bed.motors.stopped(changed)),
+            false => Ending::Stopped(self.bed.motors.stopped(event)),
+        }
     }
 }

@@ -50,13 +50,6 @@ fn an_emergency_stop_overtakes_what_is_held_on_a_slow_link() {
     });
 }
 
-/// Measures the whole table, which takes hours.
-#[test]
-#[ignore = "takes hours: run .ci/dead-man"]
-fn the_whole_table_is_met() {
-    on_a_bed(|bed| all_are_met(&table::measure(bed)));
-}
-
 /// Requires that every cell met its limit; names those that did not.
 #[track_caller]
 fn all_are_met(cells: &[Cell]) {

@@ -89,17 +89,6 @@ impl Motors {
         log.len() > last && log[last..].iter().all(Sample::drives)
     }
 
-    /// When the motors were last commanded to turn, if ever.
-    pub(crate) fn last_driven(&self) -> Option<Instant> {
-        let log = self.log.lock().unwrap();
-        log.iter().rfind(|it| it.drives()).map(|it| it.at)
-    }
-
-    /// Whether a command since `from` drove.
-    pub(crate) fn drove_since(&self, from: Instant) -> bool {
-        self.last_driven().is_some_and(|it| it >= from)
-    }
-
     /// How the motors stopped after `event`, by the commands until now.
     pub(crate) fn stopped(&self, event: Instant) -> Stopped {
         let now = Instant::now();

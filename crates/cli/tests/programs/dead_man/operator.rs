@@ -1,6 +1,7 @@
 //! The operator: real input events on the page, and what can happen to them. All selectors and texts of the page that
 //! these measurements depend on are in this file.
 
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -215,7 +216,7 @@ impl<'a> Operator<'a> {
     /// Sets the vehicle's link free again, and lets go of everything.
     pub(crate) fn recover(&mut self) {
         self.bed.link.set(CLEAR);
-        self.bed.display.input("keyup w keyup s keyup Shift_L mouseup 1 mouseup 3");
+        self.bed.display.input("keyup w keyup s keyup Alt_L keyup Control_L mouseup 1 mouseup 3");
     }
 
     /// Holds a source so that it drives ahead.
@@ -237,6 +238,8 @@ impl<'a> Operator<'a> {
             }
             Source::Gamepad => {
                 self.browser.value("test.plug(true)");
+                // The page must see it at rest first.
+                sleep(Duration::from_millis(200));
                 self.browser.value("test.pad(true, 0.9, false)");
             }
         }
@@ -262,7 +265,7 @@ impl<'a> Operator<'a> {
                 return true;
             }
             self.let_go(source);
-            std::thread::sleep(Duration::from_millis(300));
+            sleep(Duration::from_millis(300));
         }
         false
     }
@@ -297,7 +300,7 @@ impl<'a> Operator<'a> {
             }
             Event::Resize => self.resize(),
             Event::Rotation => self.rotate(),
-            Event::ModifierKey => self.bed.display.input("keydown Shift_L"),
+            Event::ModifierKey => self.bed.display.input("keydown Alt_L"),
             Event::Dialog => drop(self.browser.value("setTimeout(() => alert('A dialog'))")),
             Event::LeftView => drop(self.browser.value("document.querySelector('[data-show=mission]').click()")),
             Event::OtherSource => match source {
@@ -345,18 +348,17 @@ impl<'a> Operator<'a> {
         assert!(drives, "the mission drives");
     }
 
-    /// Opens a context menu with the mouse, and lets go under it; closes it later. Where no mouse is, a finger or a pen
-    /// opens it: that event is sent to the page.
+    /// Opens a context menu with the mouse, and lets go under it: on the map, or on the stick if the mouse holds it.
     fn open_menu(&mut self, source: Source) {
-        if source != Source::Keys {
-            self.browser.value("document.querySelector('#stick').dispatchEvent(new MouseEvent('contextmenu', { bubbles: true, cancelable: true }))");
-            return;
+        if source == Source::Mouse {
+            self.bed.display.input("click 3");
+        } else {
+            let place = self.browser.value(OF_THE_MAP);
+            let place = (place["x"].as_f64().unwrap(), place["y"].as_f64().unwrap());
+            let (x, y) = self.to_screen(place);
+            self.bed.display.input(&format!("mousemove {x} {y} click 3"));
         }
-        let place = self.browser.value(OF_THE_MAP);
-        let place = (place["x"].as_f64().unwrap(), place["y"].as_f64().unwrap());
-        let (x, y) = self.to_screen(place);
-        self.bed.display.input(&format!("mousemove {x} {y} click 3"));
-        std::thread::sleep(Duration::from_millis(300));
+        sleep(Duration::from_millis(300));
         self.let_go(source);
     }
 

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use jaus_test_kit::figures::Figures;
 
-use super::bed::Bed;
 use super::cell::{Cell, Ending, Link, Measurement};
 use super::operator::{Event, Source, Stop};
+use super::{all_are_met, on_a_bed};
 
 /// How often the operator stops the vehicle at once over each lossy link.
 const STOPS: usize = 200;
@@ -15,18 +15,67 @@ const HELD: [Duration; 2] = [Duration::from_secs(2), Duration::from_secs(12)];
 /// Links of the table in its order.
 const LINKS: [Link; 7] = Link::ALL;
 
-/// Measures the table, and writes it if that is requested.
-pub(crate) fn measure(bed: &Bed) -> Vec<Cell> {
-    let mut figures = Figures::new("dead-man", ".ci/dead-man");
-    let mut measurement = Measurement::new(bed);
-    let mut cells = Vec::new();
-    events(&mut measurement, &mut figures, &mut cells);
-    stops(&mut measurement, &mut figures, &mut cells);
-    missions(&mut measurement, &mut figures, &mut cells);
-    lossy_stops(&mut measurement, &mut figures, &mut cells);
-    refusals(&mut measurement, &mut figures, &mut cells);
-    figures.finish();
-    cells
+/// A part of the table: measures it into its figures.
+type Part = fn(&mut Measurement<'_>, &mut Figures, &mut Vec<Cell>);
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man keys"]
+fn keys() {
+    check("keys", |measurement, figures, cells| events(Source::Keys, measurement, figures, cells));
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man mouse"]
+fn mouse() {
+    check("mouse", |measurement, figures, cells| events(Source::Mouse, measurement, figures, cells));
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man touch"]
+fn touch() {
+    check("touch", |measurement, figures, cells| events(Source::Touch, measurement, figures, cells));
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man gamepad"]
+fn gamepad() {
+    check("gamepad", |measurement, figures, cells| events(Source::Gamepad, measurement, figures, cells));
+}
+
+#[test]
+#[ignore = "takes ten minutes: .ci/dead-man stops"]
+fn stops() {
+    check("stops", emergency_stops);
+}
+
+#[test]
+#[ignore = "takes five minutes: .ci/dead-man missions"]
+fn missions() {
+    check("missions", stopped_missions);
+}
+
+#[test]
+#[ignore = "takes an hour: .ci/dead-man loss"]
+fn loss() {
+    check("loss", lossy_stops);
+}
+
+#[test]
+#[ignore = "takes five minutes: .ci/dead-man refused"]
+fn refused() {
+    check("refused", refusals);
+}
+
+/// Measures a part of the table, writes it if that is requested, and requires that every cell meets its limit.
+fn check(name: &str, part: Part) {
+    on_a_bed(|bed| {
+        let command = format!(".ci/dead-man {name}");
+        let mut figures = Figures::new(&format!("dead-man-{name}"), &command);
+        let mut cells = Vec::new();
+        part(&mut Measurement::new(bed), &mut figures, &mut cells);
+        figures.finish();
+        all_are_met(&cells);
+    });
 }
 
 fn head(figures: &mut Figures, title: &str, what: &str) {
@@ -42,18 +91,21 @@ fn row(figures: &mut Figures, cells: &mut Vec<Cell>, name: &str, measure: impl F
     cells.extend(measured);
 }
 
-fn events(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
-    for source in Source::ALL {
-        let title = format!("Driving by hand: {}", source.name());
-        head(figures, &title, "what happens");
-        let happens = Event::ALL.into_iter().filter(|it| it.can_happen_to(source));
-        for event in happens {
-            row(figures, cells, event.name(), |link| measurement.event(source, event, link));
-        }
+fn events(
+    source: Source,
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
+    let title = format!("Driving by hand: {}", source.name());
+    head(figures, &title, "what happens");
+    let happens = Event::ALL.into_iter().filter(|it| it.can_happen_to(source));
+    for event in happens {
+        row(figures, cells, event.name(), |link| measurement.event(source, event, link));
     }
 }
 
-fn stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+fn emergency_stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
     head(figures, "Driving by hand: emergency stop", "how");
     for held in HELD {
         for (source, stop, name) in [
@@ -67,7 +119,7 @@ fn stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut V
     }
 }
 
-fn missions(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+fn stopped_missions(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
     head(figures, "Mission: emergency stop", "how");
     for (stop, name) in [(Stop::Escape, "Esc"), (Stop::RedButton, "red button")] {
         row(figures, cells, name, |link| measurement.stop_mission(stop, link));
