@@ -51,7 +51,14 @@ impl Bed {
         std::fs::write(token.path(), TOKEN).unwrap();
         let file = token.path().to_str().unwrap();
         let address = format!("{STATION}:8080");
-        let station = ["--listen", &address, "--token-file", file, "--interface", "vehicle"];
+        let station = [
+            "--listen",
+            &address,
+            "--token-file",
+            file,
+            "--interface",
+            "vehicle",
+        ];
         let system = System::new()?
             .with_flags("jaus-primitive-driver", &["--sabertooth", motors.device()])
             .with_flags("jaus-ocu", &station);
@@ -77,7 +84,9 @@ impl Bed {
     /// How long after this time the primitive driver's last emergency began.
     pub(crate) fn emergency_after(&self, time: SystemTime) -> Option<Duration> {
         let log = self.system.log("jaus-primitive-driver");
-        let line = log.lines().rfind(|it| it.contains("the state is emergency"))?;
+        let line = log
+            .lines()
+            .rfind(|it| it.contains("the state is emergency"))?;
         // For example 2026-11-28T04:51:04.346374Z.
         let (_, clock) = line.split_once('T')?;
         let mut parts = clock.split_once('Z')?.0.split(':').map(str::parse::<f64>);
@@ -118,7 +127,10 @@ fn set_up(names: &[String; 2], station: &str) -> Result<(), String> {
     let [browser, relay] = names;
     add_host(browser)?;
     add_host(relay)?;
-    let ends = [(browser.as_str(), "browser", "10.219.1.1"), (station, "station", STATION)];
+    let ends = [
+        (browser.as_str(), "browser", "10.219.1.1"),
+        (station, "station", STATION),
+    ];
     for ((host, cable, address), hardware) in ends.into_iter().zip(ENDS) {
         let peer = ["peer", "name", cable, "netns", relay];
         let link = ["link", "add", PAGE_INTERFACE, "netns", host, "type", "veth"];
@@ -127,11 +139,22 @@ fn set_up(names: &[String; 2], station: &str) -> Result<(), String> {
         // Packets are no larger than on a real cable.
         ip(&[&page[..], &["address", hardware, "gso_max_segs", "1"]].concat())?;
         let address = format!("{address}/24");
-        ip(&["-n", host, "address", "add", &address, "dev", PAGE_INTERFACE])?;
+        ip(&[
+            "-n",
+            host,
+            "address",
+            "add",
+            &address,
+            "dev",
+            PAGE_INTERFACE,
+        ])?;
         ip(&[&page[..], &["up"]].concat())?;
         ip(&["-n", relay, "link", "set", cable, "up"])?;
     }
-    let far = [(browser.as_str(), STATION, ENDS[1]), (station, "10.219.1.1", ENDS[0])];
+    let far = [
+        (browser.as_str(), STATION, ENDS[1]),
+        (station, "10.219.1.1", ENDS[0]),
+    ];
     for (host, address, hardware) in far {
         let neighbour = ["neighbour", "add", address, "lladdr", hardware];
         let place = ["dev", PAGE_INTERFACE, "nud", "permanent"];
@@ -149,7 +172,15 @@ pub(crate) struct Display {
 impl Display {
     fn start(host: &str) -> Result<Self, String> {
         let mut command = on_host(host, "Xvfb");
-        command.args(["-displayfd", "1", "-screen", "0", "1280x900x24", "-nolisten", "tcp"]);
+        command.args([
+            "-displayfd",
+            "1",
+            "-screen",
+            "0",
+            "1280x900x24",
+            "-nolisten",
+            "tcp",
+        ]);
         let command = command.stdout(Stdio::piped()).stderr(Stdio::null());
         let mut server = command.spawn().map_err(|error| format!("Xvfb: {error}"))?;
         let mut number = String::new();

@@ -44,25 +44,39 @@ pub(crate) enum Begins {
 
 const fn delayed(millis: u64) -> BothWays {
     let delay = Duration::from_millis(millis);
-    [Conditions { delay, ..Conditions::CLEAR }; 2]
+    [Conditions {
+        delay,
+        ..Conditions::CLEAR
+    }; 2]
 }
 
 const fn lossy(loss: u32, jitter: u64) -> BothWays {
     let jitter = Duration::from_millis(jitter);
-    [Conditions { loss, jitter, ..Conditions::CLEAR }; 2]
+    [Conditions {
+        loss,
+        jitter,
+        ..Conditions::CLEAR
+    }; 2]
 }
 
-const SLOW: Conditions = Conditions { rate: Some(400.0), ..Conditions::CLEAR };
+const SLOW: Conditions = Conditions {
+    rate: Some(400.0),
+    ..Conditions::CLEAR
+};
 
 impl Link {
     pub(crate) const DIRECT: Self = Self::new("0", CLEAR, Begins::First);
     pub(crate) const DELAYED: Self = Self::new("0.3 s", delayed(300), Begins::First);
     pub(crate) const SLOW: Self = Self::new("400 octets/s", [SLOW; 2], Begins::WhileDriving);
     /// The way back is free: the picture stays fresh.
-    pub(crate) const SLOW_UP: Self =
-        Self::new("400 octets/s up", [SLOW, Conditions::CLEAR], Begins::WhileDriving);
+    pub(crate) const SLOW_UP: Self = Self::new(
+        "400 octets/s up",
+        [SLOW, Conditions::CLEAR],
+        Begins::WhileDriving,
+    );
     pub(crate) const LOSSY: Self = Self::new("5 % loss", lossy(50, 30), Begins::BeforeHolding);
-    pub(crate) const VERY_LOSSY: Self = Self::new("30 % loss", lossy(300, 50), Begins::BeforeHolding);
+    pub(crate) const VERY_LOSSY: Self =
+        Self::new("30 % loss", lossy(300, 50), Begins::BeforeHolding);
     pub(crate) const CUT: Self = Self::new("cut", [Conditions::CUT; 2], Begins::WithEvent);
     pub(crate) const ALL: [Self; 7] = [
         Self::DIRECT,
@@ -82,11 +96,19 @@ impl Link {
     ];
 
     const fn new(name: &'static str, conditions: BothWays, begins: Begins) -> Self {
-        Self { name, conditions, begins, is_refused: false }
+        Self {
+            name,
+            conditions,
+            begins,
+            is_refused: false,
+        }
     }
 
     const fn refused(self) -> Self {
-        Self { is_refused: true, ..self }
+        Self {
+            is_refused: true,
+            ..self
+        }
     }
 
     /// The longest time that a packet is under way when the link is free.
@@ -105,12 +127,18 @@ impl Link {
 
     /// The conditions between the start of the drive and the event.
     fn conditions_before_event(&self) -> BothWays {
-        if self.begins == Begins::WithEvent { CLEAR } else { self.conditions }
+        if self.begins == Begins::WithEvent {
+            CLEAR
+        } else {
+            self.conditions
+        }
     }
 
     fn emergency_limit(&self) -> Duration {
         let rate = self.conditions[0].rate;
-        let sent = rate.map_or(Duration::ZERO, |it| Duration::from_secs_f64(EMERGENCY_OCTETS / it));
+        let sent = rate.map_or(Duration::ZERO, |it| {
+            Duration::from_secs_f64(EMERGENCY_OCTETS / it)
+        });
         if self.begins == Begins::WithEvent {
             return DEAD_MAN;
         }
@@ -167,7 +195,10 @@ impl fmt::Display for Cell {
     /// For example `0.12 s; 0.40 s, 1.0 m/s, 0.25 m`: the command, then rest, speed and distance. A missed limit is bold.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let seconds = |time: Option<Duration>| {
-            time.map_or_else(|| "never".to_owned(), |it| format!("{:.2} s", it.as_secs_f64()))
+            time.map_or_else(
+                || "never".to_owned(),
+                |it| format!("{:.2} s", it.as_secs_f64()),
+            )
         };
         let (before, stopped) = match &self.ending {
             Ending::Refused => return f.write_str("refused"),
@@ -215,7 +246,12 @@ impl<'a> Measurement<'a> {
 
     /// A source has been held for some time, and the operator stops the vehicle at once.
     pub(crate) fn stop(&mut self, source: Source, stop: Stop, link: Link, held: Duration) -> Cell {
-        let name = format!("{}, {stop:?} after {} s, {}", source.name(), held.as_secs(), link.name);
+        let name = format!(
+            "{}, {stop:?} after {} s, {}",
+            source.name(),
+            held.as_secs(),
+            link.name
+        );
         let limit = link.emergency_limit();
         let mut pressed = SystemTime::now();
         let mut cell = self.measure(name, limit, source, link, held, |it| {
@@ -254,7 +290,10 @@ impl<'a> Measurement<'a> {
     /// Waits until the vehicle is in emergency, over a free link.
     fn emergency_is_seen(&mut self) {
         self.bed.link.set(CLEAR);
-        assert!(self.operator.sees_emergency(), "the emergency is repeated until the vehicle confirms it");
+        assert!(
+            self.operator.sees_emergency(),
+            "the emergency is repeated until the vehicle confirms it"
+        );
     }
 
     fn measure(
@@ -276,8 +315,20 @@ impl<'a> Measurement<'a> {
             false => String::new(),
         };
         self.operator.recover();
-        let cell = Cell { name, ending, limit, is_refused: link.is_refused, emergency: None, line };
-        println!("{}: {cell} (limit {:.2} s) [{}]", cell.name, limit.as_secs_f64(), cell.line);
+        let cell = Cell {
+            name,
+            ending,
+            limit,
+            is_refused: link.is_refused,
+            emergency: None,
+            line,
+        };
+        println!(
+            "{}: {cell} (limit {:.2} s) [{}]",
+            cell.name,
+            limit.as_secs_f64(),
+            cell.line
+        );
         cell
     }
 
@@ -288,7 +339,11 @@ impl<'a> Measurement<'a> {
         held: Duration,
         happen: impl FnOnce(&mut Operator<'a>) -> Instant,
     ) -> Ending {
-        let set = |begins| if link.begins == begins { self.bed.link.set(link.conditions) };
+        let set = |begins| {
+            if link.begins == begins {
+                self.bed.link.set(link.conditions)
+            }
+        };
         set(Begins::First);
         self.operator.engage();
         set(Begins::BeforeHolding);
@@ -300,7 +355,11 @@ impl<'a> Measurement<'a> {
         set(Begins::WhileDriving);
         let is_free = link.conditions[0].loss == 0 && link.begins == Begins::WhileDriving;
         // A lossy link may end a drive at any time: the event comes as long as it lasts.
-        let held = if link.conditions[0].loss > 0 { held.min(Duration::from_millis(700)) } else { held };
+        let held = if link.conditions[0].loss > 0 {
+            held.min(Duration::from_millis(700))
+        } else {
+            held
+        };
         sleep(held);
         let has_stopped = is_free && !self.bed.motors.drive();
         set(Begins::WithEvent);

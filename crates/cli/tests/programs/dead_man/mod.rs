@@ -55,9 +55,22 @@ fn an_emergency_stop_overtakes_what_is_held_on_a_slow_link() {
 fn all_are_met(cells: &[Cell]) {
     let missed = cells.iter().filter(|it| !it.is_met());
     let missed: Vec<_> = missed
-        .map(|it| format!("{}: {it}, limit {:.2} s [{}]", it.name, it.limit.as_secs_f64(), it.line))
+        .map(|it| {
+            format!(
+                "{}: {it}, limit {:.2} s [{}]",
+                it.name,
+                it.limit.as_secs_f64(),
+                it.line
+            )
+        })
         .collect();
-    assert!(missed.is_empty(), "missed by {} of {}:\n{}", missed.len(), cells.len(), missed.join("\n"));
+    assert!(
+        missed.is_empty(),
+        "missed by {} of {}:\n{}",
+        missed.len(),
+        cells.len(),
+        missed.join("\n")
+    );
 }
 
 /// Runs a test with all hosts and programs. One at a time: it measures times.
@@ -66,9 +79,15 @@ fn on_a_bed(body: impl FnOnce(&Bed)) {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let lacks = |program: &str| Command::new(program).arg("-help").output().is_err();
     let tools = ["Xvfb", "xdotool"].into_iter().filter(|it| lacks(it));
-    let missing: Vec<_> = browser::missing().into_iter().chain(tools.map(str::to_owned)).collect();
+    let missing: Vec<_> = browser::missing()
+        .into_iter()
+        .chain(tools.map(str::to_owned))
+        .collect();
     if !missing.is_empty() {
-        return not_tested(&this_test(), &format!("not installed: {}", missing.join(", ")));
+        return not_tested(
+            &this_test(),
+            &format!("not installed: {}", missing.join(", ")),
+        );
     }
     let missing = system::missing();
     if !missing.is_empty() {

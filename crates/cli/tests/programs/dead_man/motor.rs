@@ -94,9 +94,16 @@ impl Motors {
         let now = Instant::now();
         let log = self.log.lock().unwrap();
         let before = log.partition_point(|it| it.at < event);
-        let mut zero = log.get(before.wrapping_sub(1)).is_none_or(|it| !it.drives()).then_some(event);
+        let mut zero = log
+            .get(before.wrapping_sub(1))
+            .is_none_or(|it| !it.drives())
+            .then_some(event);
         for sample in &log[before..] {
-            zero = if sample.drives() { None } else { zero.or(Some(sample.at)) };
+            zero = if sample.drives() {
+                None
+            } else {
+                zero.or(Some(sample.at))
+            };
         }
         // Without commands, the controller brakes by itself.
         let end = log.last().map_or(event, |it| it.at + TIMEOUT);
@@ -194,6 +201,9 @@ impl Packets {
 #[test]
 fn packets_are_found_again_after_damaged_ones() {
     let mut packets = Packets::default();
-    assert_eq!(packets.read(&[7, 128, 0, 127, 127, 128, 5]), <[[f64; 2]; 0]>::default());
+    assert_eq!(
+        packets.read(&[7, 128, 0, 127, 127, 128, 5]),
+        <[[f64; 2]; 0]>::default()
+    );
     assert_eq!(packets.read(&[127, 4]), [[1.0, -1.0]]);
 }

@@ -202,7 +202,8 @@ impl<'a> Operator<'a> {
         self.browser.call(add, &script);
         self.browser.open(&self.bed.page());
         self.browser.wait(IS_LIVE);
-        self.browser.wait("document.querySelectorAll('#parts .part').length >= 4");
+        self.browser
+            .wait("document.querySelectorAll('#parts .part').length >= 4");
     }
 
     fn clear_emergency(&mut self) {
@@ -216,7 +217,9 @@ impl<'a> Operator<'a> {
     /// Sets the vehicle's link free again, and lets go of everything.
     pub(crate) fn recover(&mut self) {
         self.bed.link.set(CLEAR);
-        self.bed.display.input("keyup w keyup s keyup Alt_L keyup Control_L mouseup 1 mouseup 3");
+        self.bed
+            .display
+            .input("keyup w keyup s keyup Alt_L keyup Control_L mouseup 1 mouseup 3");
     }
 
     /// Holds a source so that it drives ahead.
@@ -272,7 +275,12 @@ impl<'a> Operator<'a> {
 
     /// Lets an event happen to a source that is held. Returns the time of the last sign of life.
     pub(crate) fn happen(&mut self, event: Event, source: Source) -> Instant {
-        let closes = [Event::LeftPage, Event::ClosedTab, Event::KilledBrowser, Event::Dialog];
+        let closes = [
+            Event::LeftPage,
+            Event::ClosedTab,
+            Event::KilledBrowser,
+            Event::Dialog,
+        ];
         self.is_open = !closes.contains(&event);
         let sign = Instant::now();
         match event {
@@ -282,9 +290,12 @@ impl<'a> Operator<'a> {
                 self.let_go(source);
             }
             Event::ContextMenu => self.open_menu(source),
-            Event::LostCapture if source == Source::Gamepad => drop(self.browser.value("test.plug(false)")),
+            Event::LostCapture if source == Source::Gamepad => {
+                drop(self.browser.value("test.plug(false)"))
+            }
             Event::LostCapture => {
-                let release = "document.querySelector('#stick').releasePointerCapture(test.pointer)";
+                let release =
+                    "document.querySelector('#stick').releasePointerCapture(test.pointer)";
                 self.browser.value(release);
             }
             Event::Blur => self.bed.display.input("key --clearmodifiers ctrl+l"),
@@ -302,7 +313,10 @@ impl<'a> Operator<'a> {
             Event::Rotation => self.rotate(),
             Event::ModifierKey => self.bed.display.input("keydown Alt_L"),
             Event::Dialog => drop(self.browser.value("setTimeout(() => alert('A dialog'))")),
-            Event::LeftView => drop(self.browser.value("document.querySelector('[data-show=mission]').click()")),
+            Event::LeftView => drop(
+                self.browser
+                    .value("document.querySelector('[data-show=mission]').click()"),
+            ),
             Event::OtherSource => match source {
                 Source::Keys | Source::Gamepad => self.hold(Source::Mouse),
                 Source::Mouse | Source::Touch => self.bed.display.input("keydown w"),
@@ -317,7 +331,10 @@ impl<'a> Operator<'a> {
         let sign = Instant::now();
         match (how, place) {
             (Stop::PadButton, _) => drop(self.browser.value("test.pad(true, 0.9, true)")),
-            (_, Some((x, y))) => self.bed.display.input(&format!("mousemove {x} {y} click 1")),
+            (_, Some((x, y))) => self
+                .bed
+                .display
+                .input(&format!("mousemove {x} {y} click 1")),
             _ => self.bed.display.input("key Escape"),
         }
         sign
@@ -325,7 +342,8 @@ impl<'a> Operator<'a> {
 
     /// Waits until the page shows the emergency.
     pub(crate) fn sees_emergency(&mut self) -> bool {
-        self.browser.holds_within(Duration::from_secs(30), IS_IN_EMERGENCY)
+        self.browser
+            .holds_within(Duration::from_secs(30), IS_IN_EMERGENCY)
     }
 
     /// Whether its page is still there and runs.
@@ -340,8 +358,14 @@ impl<'a> Operator<'a> {
 
     /// Starts a slow mission to the farther one of two destinations, and waits until the motors turn.
     pub(crate) fn start_mission(&mut self) {
-        let north = self.browser.value("parseFloat(document.querySelector('#north').textContent)");
-        let destination = if north.as_f64().unwrap() < 0.0 { FAR } else { FAR_BACK };
+        let north = self
+            .browser
+            .value("parseFloat(document.querySelector('#north').textContent)");
+        let destination = if north.as_f64().unwrap() < 0.0 {
+            FAR
+        } else {
+            FAR_BACK
+        };
         plan(&mut self.browser, destination, Some(SLOW));
         approve(&mut self.browser);
         let drives = within(Duration::from_secs(30), || self.bed.motors.drive());
@@ -356,7 +380,9 @@ impl<'a> Operator<'a> {
             let place = self.browser.value(OF_THE_MAP);
             let place = (place["x"].as_f64().unwrap(), place["y"].as_f64().unwrap());
             let (x, y) = self.to_screen(place);
-            self.bed.display.input(&format!("mousemove {x} {y} click 3"));
+            self.bed
+                .display
+                .input(&format!("mousemove {x} {y} click 3"));
         }
         sleep(Duration::from_millis(300));
         self.let_go(source);
@@ -364,27 +390,34 @@ impl<'a> Operator<'a> {
 
     fn resize(&mut self) {
         let window = self.browser.call("Browser.getWindowForTarget", &json!({}));
-        let bounds = json!({ "windowId": window["windowId"], "bounds": { "width": 1000, "height": 860 } });
+        let bounds =
+            json!({ "windowId": window["windowId"], "bounds": { "width": 1000, "height": 860 } });
         self.browser.call("Browser.setWindowBounds", &bounds);
     }
 
     fn rotate(&mut self) {
         let turned = json!({ "width": 800, "height": 1180, "deviceScaleFactor": 1, "mobile": true,
             "screenOrientation": { "type": "portraitPrimary", "angle": 90 } });
-        self.browser.call("Emulation.setDeviceMetricsOverride", &turned);
+        self.browser
+            .call("Emulation.setDeviceMetricsOverride", &turned);
     }
 
     fn touch(&mut self, kind: &str, place: Option<(f64, f64)>) {
-        let points: Vec<_> = place.iter().map(|(x, y)| json!({ "x": x, "y": y })).collect();
+        let points: Vec<_> = place
+            .iter()
+            .map(|(x, y)| json!({ "x": x, "y": y }))
+            .collect();
         let event = json!({ "type": kind, "touchPoints": points });
         self.browser.call("Input.dispatchTouchEvent", &event);
     }
 
     /// The middle of an element on the page.
     fn middle(&mut self, selector: &str) -> (f64, f64) {
-        let measure = format!("document.querySelector('{selector}').getBoundingClientRect().toJSON()");
+        let measure =
+            format!("document.querySelector('{selector}').getBoundingClientRect().toJSON()");
         let place = self.browser.value(&measure);
-        let [x, y, width, height] = ["x", "y", "width", "height"].map(|it| place[it].as_f64().unwrap());
+        let [x, y, width, height] =
+            ["x", "y", "width", "height"].map(|it| place[it].as_f64().unwrap());
         (x + width / 2.0, y + height / 2.0)
     }
 
@@ -395,7 +428,8 @@ impl<'a> Operator<'a> {
     }
 
     fn to_screen(&mut self, (x, y): (f64, f64)) -> (i64, i64) {
-        let edges = "[screenX + (outerWidth - innerWidth) / 2, screenY + outerHeight - innerHeight]";
+        let edges =
+            "[screenX + (outerWidth - innerWidth) / 2, screenY + outerHeight - innerHeight]";
         let edges = self.browser.value(edges);
         let edge = |axis: usize| edges[axis].as_f64().unwrap();
         ((x + edge(0)).round() as i64, (y + edge(1)).round() as i64)

@@ -135,10 +135,7 @@ fn open(interface: &str) -> io::Result<OwnedFd> {
     )?;
     let mut addresses = getifaddrs()?.filter(|it| it.interface_name == interface);
     let address = addresses.find_map(|it| it.address?.as_link_addr().copied());
-    bind(
-        opened.as_raw_fd(),
-        &address.ok_or(io::ErrorKind::NotFound)?,
-    )?;
+    bind(opened.as_raw_fd(), &address.ok_or(io::ErrorKind::NotFound)?)?;
     Ok(opened)
 }
 

@@ -21,25 +21,33 @@ type Part = fn(&mut Measurement<'_>, &mut Figures, &mut Vec<Cell>);
 #[test]
 #[ignore = "takes a quarter of an hour: .ci/dead-man keys"]
 fn keys() {
-    check("keys", |measurement, figures, cells| events(Source::Keys, measurement, figures, cells));
+    check("keys", |measurement, figures, cells| {
+        events(Source::Keys, measurement, figures, cells)
+    });
 }
 
 #[test]
 #[ignore = "takes a quarter of an hour: .ci/dead-man mouse"]
 fn mouse() {
-    check("mouse", |measurement, figures, cells| events(Source::Mouse, measurement, figures, cells));
+    check("mouse", |measurement, figures, cells| {
+        events(Source::Mouse, measurement, figures, cells)
+    });
 }
 
 #[test]
 #[ignore = "takes a quarter of an hour: .ci/dead-man touch"]
 fn touch() {
-    check("touch", |measurement, figures, cells| events(Source::Touch, measurement, figures, cells));
+    check("touch", |measurement, figures, cells| {
+        events(Source::Touch, measurement, figures, cells)
+    });
 }
 
 #[test]
 #[ignore = "takes a quarter of an hour: .ci/dead-man gamepad"]
 fn gamepad() {
-    check("gamepad", |measurement, figures, cells| events(Source::Gamepad, measurement, figures, cells));
+    check("gamepad", |measurement, figures, cells| {
+        events(Source::Gamepad, measurement, figures, cells)
+    });
 }
 
 #[test]
@@ -84,7 +92,12 @@ fn head(figures: &mut Figures, title: &str, what: &str) {
 }
 
 /// Measures a row: one cell for each link.
-fn row(figures: &mut Figures, cells: &mut Vec<Cell>, name: &str, measure: impl FnMut(Link) -> Cell) {
+fn row(
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+    name: &str,
+    measure: impl FnMut(Link) -> Cell,
+) {
     let measured = LINKS.map(measure);
     let [a, b, c, d, e, f, g] = measured.each_ref().map(ToString::to_string);
     figures.row([name, &a, &b, &c, &d, &e, &f, &g]);
@@ -101,28 +114,46 @@ fn events(
     head(figures, &title, "what happens");
     let happens = Event::ALL.into_iter().filter(|it| it.can_happen_to(source));
     for event in happens {
-        row(figures, cells, event.name(), |link| measurement.event(source, event, link));
+        row(figures, cells, event.name(), |link| {
+            measurement.event(source, event, link)
+        });
     }
 }
 
-fn emergency_stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+fn emergency_stops(
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
     head(figures, "Driving by hand: emergency stop", "how");
     for held in HELD {
         for (source, stop, name) in [
             (Source::Keys, Stop::Escape, "Esc, a key held"),
             (Source::Touch, Stop::RedButton, "red button, the stick held"),
-            (Source::Gamepad, Stop::PadButton, "B of the gamepad, it is held"),
+            (
+                Source::Gamepad,
+                Stop::PadButton,
+                "B of the gamepad, it is held",
+            ),
         ] {
             let name = format!("{name} for {} s", held.as_secs());
-            row(figures, cells, &name, |link| measurement.stop(source, stop, link, held));
+            row(figures, cells, &name, |link| {
+                measurement.stop(source, stop, link, held)
+            });
         }
     }
 }
 
-fn stopped_missions(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+fn stopped_missions(
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
     head(figures, "Mission: emergency stop", "how");
     for (stop, name) in [(Stop::Escape, "Esc"), (Stop::RedButton, "red button")] {
-        row(figures, cells, name, |link| measurement.stop_mission(stop, link));
+        row(figures, cells, name, |link| {
+            measurement.stop_mission(stop, link)
+        });
     }
 }
 
@@ -148,7 +179,16 @@ fn lossy_stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: 
 }
 
 fn refusals(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
-    figures.table("Links that are too slow", ["source", "0.8 s", "1.5 s", "0.8 s while driving", "1.5 s while driving"]);
+    figures.table(
+        "Links that are too slow",
+        [
+            "source",
+            "0.8 s",
+            "1.5 s",
+            "0.8 s while driving",
+            "1.5 s while driving",
+        ],
+    );
     for source in Source::ALL {
         let measured = Link::REFUSED.map(|link| measurement.event(source, Event::Release, link));
         let [a, b, c, d] = measured.each_ref().map(ToString::to_string);

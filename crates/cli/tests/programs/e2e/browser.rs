@@ -11,7 +11,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use serde_json::{Value, json};
+
+pub(crate) use super::accessible::Accessible;
 
 /// Number of browsers started: each has its own profile.
 static BROWSERS: AtomicU32 = AtomicU32::new(0);
@@ -378,12 +381,6 @@ impl Browser {
         )
     }
 
-    /// Sends a command of the DevTools protocol that has no method here.
-    #[track_caller]
-    pub(crate) fn command(&mut self, method: &str, parameters: &Value) -> Value {
-        self.call(method, parameters)
-    }
-
     /// Touches the middle of an element, once it is visible and enabled.
     #[track_caller]
     pub(crate) fn press(&mut self, selector: &str) {
@@ -562,7 +559,9 @@ impl Browser {
         let shot = shots.find_map(Result::ok).expect("a picture of the page");
         let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("e2e-screenshots");
         std::fs::create_dir_all(&directory).unwrap();
-        let octets = from_base64(shot["data"].as_str().unwrap());
+        let octets = BASE64_STANDARD
+            .decode(shot["data"].as_str().unwrap())
+            .unwrap();
         std::fs::write(directory.join(name).with_extension("png"), octets).unwrap();
     }
 }
@@ -580,59 +579,6 @@ fn write(commands: &Mutex<ChildStdin>, command: &Value) {
     commands.lock().unwrap().write_all(&octets).unwrap();
 }
 
-/// A node of the accessibility tree.
-#[derive(Debug)]
-pub(crate) struct Accessible {
-    pub(crate) role: String,
-    pub(crate) name: String,
-    pub(crate) is_focusable: bool,
-    /// `polite` or `assertive` for a live region; empty otherwise.
-    pub(crate) live: String,
-    /// All text in it.
-    pub(crate) text: String,
-}
-
-impl Accessible {
-    fn of(node: &Value, nodes: &[Value]) -> Self {
-        let text = |value: &Value| {
-            value["value"]
-                .as_str()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
-        };
-        let properties = node["properties"].as_array().into_iter().flatten();
-        let property = |name: &str| {
-            let mut named = properties.clone().filter(|it| it["name"] == name);
-            named
-                .next()
-                .map(|it| it["value"].clone())
-                .unwrap_or_default()
-        };
-        let live = text(&property("live"));
-        Self {
-            role: text(&node["role"]),
-            name: text(&node["name"]),
-            is_focusable: property("focusable")["value"] == true,
-            live: if live == "off" { String::new() } else { live },
-            text: text_within(node, nodes),
-        }
-    }
-}
-
-fn text_within(node: &Value, nodes: &[Value]) -> String {
-    if node["role"]["value"] == "StaticText" {
-        return node["name"]["value"]
-            .as_str()
-            .unwrap_or_default()
-            .to_owned();
-    }
-    let ids = node["childIds"].as_array().into_iter().flatten();
-    let children = ids.filter_map(|id| nodes.iter().find(|it| it["nodeId"] == *id));
-    let texts: Vec<_> = children.map(|it| text_within(it, nodes)).collect();
-    texts.join(" ")
-}
-
 impl Drop for Browser {
     fn drop(&mut self) {
         self.stop_repeats();
@@ -640,18 +586,4 @@ impl Drop for Browser {
         let _ = self.child.wait();
         let _ = std::fs::remove_dir_all(&self.profile);
     }
-}
-
-/// Decodes Base64, the encoding of screenshots.
-fn from_base64(text: &str) -> Vec<u8> {
-    let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let digits = text
-        .bytes()
-        .filter_map(|letter| alphabet.iter().position(|it| *it == letter));
-    let digits: Vec<usize> = digits.collect();
-    let groups = digits.chunks(4).flat_map(|group| {
-        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
-        (0..group.len() - 1).map(move |octet| (bits >> (16 - 8 * octet)) as u8)
-    });
-    groups.collect()
 }

@@ -5,6 +5,7 @@
 //! They need Chromium and network namespaces. Without these, the tests report this prominently and
 //! pass, but fail if `JAUS_EVIDENCE=required` is set.
 
+mod accessible;
 mod base_map;
 pub(crate) mod browser;
 mod by_hand;
