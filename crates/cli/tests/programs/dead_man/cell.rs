@@ -361,6 +361,9 @@ impl<'a> Measurement<'a> {
             held
         };
         sleep(held);
+        let now = Instant::now();
+        let share = self.bed.motors.share_driven(changed, now);
+        println!("driven for {:.0} % of {:.1} s", 100.0 * share, (now - changed).as_secs_f64());
         let has_stopped = is_free && !self.bed.motors.drive();
         set(Begins::WithEvent);
         let event = happen(&mut self.operator);

@@ -89,6 +89,14 @@ impl Motors {
         log.len() > last && log[last..].iter().all(Sample::drives)
     }
 
+    /// The share of commands between two times that drove, 0 to 1.
+    pub(crate) fn share_driven(&self, from: Instant, to: Instant) -> f64 {
+        let log = self.log.lock().unwrap();
+        let within = log.iter().filter(|it| (from..to).contains(&it.at));
+        let driven = within.clone().filter(|it| it.drives()).count();
+        driven as f64 / within.count().max(1) as f64
+    }
+
     /// How the motors stopped after `event`, by the commands until now.
     pub(crate) fn stopped(&self, event: Instant) -> Stopped {
         let now = Instant::now();

@@ -298,7 +298,7 @@ impl<'a> Operator<'a> {
                     "document.querySelector('#stick').releasePointerCapture(test.pointer)";
                 self.browser.value(release);
             }
-            Event::Blur => self.bed.display.input("key --clearmodifiers ctrl+l"),
+            Event::Blur => self.bed.display.input("key F6"),
             Event::Hidden => drop(self.browser.cover_tab()),
             Event::LeftPage => {
                 let blank = json!({ "url": "about:blank" });
