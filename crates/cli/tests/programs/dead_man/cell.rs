@@ -16,6 +16,9 @@ pub(crate) const DEAD_MAN: Duration = Duration::from_millis(500);
 const EMERGENCY: Duration = Duration::from_millis(300);
 /// Octets of an emergency stop on the link, with all headers.
 const EMERGENCY_OCTETS: f64 = 200.0;
+/// Least speeds of a vehicle that is driven, in m/s: by hand at up to 1.0, and on a mission at 0.2.
+const BY_HAND: f64 = 0.8;
+const MISSION: f64 = 0.1;
 /// How long the motors are observed after an event.
 const WATCH: Duration = Duration::from_millis(3500);
 
@@ -111,6 +114,13 @@ impl Link {
         }
     }
 
+    /// Whether a vehicle must be drivable over it all the time.
+    fn is_free(&self) -> bool {
+        let is_free = |it: &Conditions| it.loss == 0 && it.rate.is_none();
+        let before = self.conditions_before_event();
+        !self.is_refused && before.iter().all(is_free)
+    }
+
     /// The longest time that a packet is under way when the link is free.
     pub(crate) fn one_way(&self) -> Duration {
         self.conditions[0].delay + self.conditions[0].jitter
@@ -165,7 +175,9 @@ pub(crate) struct Cell {
     pub(crate) name: String,
     pub(crate) ending: Ending,
     pub(crate) limit: Duration,
-    is_refused: bool,
+    link: Link,
+    /// Speed before the event over a free link, in m/s, at least.
+    speed: f64,
     /// When an emergency stop of a vehicle that stood already was in force.
     emergency: Option<Duration>,
     /// What the page said about driving at the end.
@@ -177,16 +189,23 @@ impl Cell {
         Self { limit, ..self }
     }
 
+    /// Whether the vehicle was driven before the event: over a free link as fast as commanded, not in jerks.
+    fn has_moved(&self, stopped: &Stopped) -> bool {
+        !self.link.is_free() || stopped.speed >= self.speed
+    }
+
     /// Whether the motors stopped within the limit.
     pub(crate) fn is_met(&self) -> bool {
         let is_in_time = |it: &Stopped| it.command.is_some_and(|time| time <= self.limit);
         match &self.ending {
-            Ending::Stopped(stopped) => !self.is_refused && is_in_time(stopped),
+            Ending::Stopped(stopped) => {
+                !self.link.is_refused && is_in_time(stopped) && self.has_moved(stopped)
+            }
             Ending::StoppedBefore(stopped) => {
                 stopped.command.is_some_and(|time| time <= DEAD_MAN)
                     && self.emergency.is_none_or(|time| time <= self.limit)
             }
-            Ending::Refused => true,
+            Ending::Refused => !self.link.is_free() || self.link.is_refused,
         }
     }
 }
@@ -200,12 +219,14 @@ impl fmt::Display for Cell {
                 |it| format!("{:.2} s", it.as_secs_f64()),
             )
         };
+        let is_emergency_late = self.emergency.is_some_and(|time| time > self.limit);
         let (before, stopped) = match &self.ending {
-            Ending::Refused => return f.write_str("refused"),
+            Ending::Refused if self.is_met() => return f.write_str("refused"),
+            Ending::Refused => return f.write_str("**refused**"),
             Ending::Stopped(stopped) => ("", stopped),
             Ending::StoppedBefore(stopped) => ("link: ", stopped),
         };
-        let mark = if self.is_met() { "" } else { "**" };
+        let mark = if self.is_met() || is_emergency_late { "" } else { "**" };
         write!(
             f,
             "{before}{mark}{}{mark}; {}, {:.1} m/s, {:.2} m",
@@ -215,6 +236,7 @@ impl fmt::Display for Cell {
             stopped.metres
         )?;
         match self.emergency {
+            Some(time) if is_emergency_late => write!(f, "; emergency **{:.2} s**", time.as_secs_f64()),
             Some(time) => write!(f, "; emergency {:.2} s", time.as_secs_f64()),
             None => Ok(()),
         }
@@ -282,7 +304,7 @@ impl<'a> Measurement<'a> {
         sleep((event + WATCH).saturating_duration_since(Instant::now()));
         let ending = Ending::Stopped(self.bed.motors.stopped(event));
         // Nothing reaches the vehicle over a cut link: its mission goes on, as it was approved.
-        let cell = self.finish(name, link.emergency_limit(), link, ending);
+        let cell = self.finish(name, link.emergency_limit(), link, MISSION, ending);
         self.emergency_is_seen();
         cell
     }
@@ -306,10 +328,17 @@ impl<'a> Measurement<'a> {
         happen: impl FnOnce(&mut Operator<'a>) -> Instant,
     ) -> Cell {
         let ending = self.run(source, link, held, happen);
-        self.finish(name, limit, link, ending)
+        self.finish(name, limit, link, BY_HAND, ending)
     }
 
-    fn finish(&mut self, name: String, limit: Duration, link: Link, ending: Ending) -> Cell {
+    fn finish(
+        &mut self,
+        name: String,
+        limit: Duration,
+        link: Link,
+        speed: f64,
+        ending: Ending,
+    ) -> Cell {
         let line = match self.operator.is_open() {
             true => self.operator.line(),
             false => String::new(),
@@ -319,7 +348,8 @@ impl<'a> Measurement<'a> {
             name,
             ending,
             limit,
-            is_refused: link.is_refused,
+            link,
+            speed,
             emergency: None,
             line,
         };
