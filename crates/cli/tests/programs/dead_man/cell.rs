@@ -17,7 +17,7 @@ const EMERGENCY: Duration = Duration::from_millis(300);
 /// Octets of an emergency stop on the link, with all headers.
 const EMERGENCY_OCTETS: f64 = 200.0;
 /// Least speeds of a vehicle that is driven, in m/s: by hand at up to 1.0, and on a mission at 0.2.
-const BY_HAND: f64 = 0.8;
+const BY_HAND: f64 = 0.5;
 const MISSION: f64 = 0.1;
 /// How long the motors are observed after an event.
 const WATCH: Duration = Duration::from_millis(3500);
@@ -226,7 +226,11 @@ impl fmt::Display for Cell {
             Ending::Stopped(stopped) => ("", stopped),
             Ending::StoppedBefore(stopped) => ("link: ", stopped),
         };
-        let mark = if self.is_met() || is_emergency_late { "" } else { "**" };
+        let mark = if self.is_met() || is_emergency_late {
+            ""
+        } else {
+            "**"
+        };
         write!(
             f,
             "{before}{mark}{}{mark}; {}, {:.1} m/s, {:.2} m",
@@ -236,7 +240,9 @@ impl fmt::Display for Cell {
             stopped.metres
         )?;
         match self.emergency {
-            Some(time) if is_emergency_late => write!(f, "; emergency **{:.2} s**", time.as_secs_f64()),
+            Some(time) if is_emergency_late => {
+                write!(f, "; emergency **{:.2} s**", time.as_secs_f64())
+            }
             Some(time) => write!(f, "; emergency {:.2} s", time.as_secs_f64()),
             None => Ok(()),
         }
@@ -378,23 +384,10 @@ impl<'a> Measurement<'a> {
         self.operator.engage();
         set(Begins::BeforeHolding);
         sleep(link.round_trip() + Duration::from_millis(300));
-        if !self.operator.drive(source, Duration::from_secs(8)) {
+        let Some(changed) = self.drive(source, link, held) else {
             return Ending::Refused;
-        }
-        let changed = Instant::now();
-        set(Begins::WhileDriving);
-        let is_free = link.conditions[0].loss == 0 && link.begins == Begins::WhileDriving;
-        // A lossy link may end a drive at any time: the event comes as long as it lasts.
-        let held = if link.conditions[0].loss > 0 {
-            held.min(Duration::from_millis(700))
-        } else {
-            held
         };
-        sleep(held);
-        let now = Instant::now();
-        let share = self.bed.motors.share_driven(changed, now);
-        println!("driven for {:.0} % of {:.1} s", 100.0 * share, (now - changed).as_secs_f64());
-        let has_stopped = is_free && !self.bed.motors.drive();
+        let has_stopped = link.begins == Begins::WhileDriving && !self.bed.motors.drive();
         set(Begins::WithEvent);
         let event = happen(&mut self.operator);
         sleep((event + WATCH).saturating_duration_since(Instant::now()));
@@ -402,5 +395,41 @@ impl<'a> Measurement<'a> {
             true => Ending::StoppedBefore(self.bed.motors.stopped(changed)),
             false => Ending::Stopped(self.bed.motors.stopped(event)),
         }
+    }
+
+    /// Holds a source for some time. Returns since when the vehicle is driven or, if the link becomes worse meanwhile, when
+    /// that was; `None` if it is not driven.
+    fn drive(&mut self, source: Source, link: Link, held: Duration) -> Option<Instant> {
+        /// A busy machine ends a drive, too: what is held is taken up once more.
+        const ATTEMPTS: usize = 3;
+        // A lossy link may end a drive at any time: the event comes as long as it lasts.
+        let is_lossy = link.conditions_before_event()[0].loss > 0;
+        let held = if is_lossy {
+            held.min(Duration::from_millis(700))
+        } else {
+            held
+        };
+        for _ in 0..ATTEMPTS {
+            if !self.operator.drive(source, Duration::from_secs(8)) {
+                return None;
+            }
+            let begun = Instant::now();
+            if link.begins == Begins::WhileDriving {
+                self.bed.link.set(link.conditions);
+            }
+            sleep(held);
+            let now = Instant::now();
+            let share = 100.0 * self.bed.motors.share_driven(begun, now);
+            println!(
+                "driven for {share:.0} % of {:.1} s",
+                (now - begun).as_secs_f64()
+            );
+            if link.begins == Begins::WhileDriving || self.bed.motors.drive() {
+                return Some(begun);
+            }
+            self.operator.let_go(source);
+            sleep(Duration::from_millis(800));
+        }
+        None
     }
 }
