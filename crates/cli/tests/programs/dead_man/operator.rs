@@ -360,8 +360,8 @@ impl<'a> Operator<'a> {
     pub(crate) fn start_mission(&mut self) {
         let north = self
             .browser
-            .value("parseFloat(document.querySelector('#north').textContent)");
-        let destination = if north.as_f64().unwrap() < 0.0 {
+            .value("parseFloat(document.querySelector('#north').textContent.replace('−', '-'))");
+        let destination = if north.as_f64().unwrap_or(0.0) < 0.0 {
             FAR
         } else {
             FAR_BACK
