@@ -377,7 +377,7 @@ impl<'a> Measurement<'a> {
     ) -> Ending {
         let set = |begins| {
             if link.begins == begins {
-                self.bed.link.set(link.conditions)
+                self.bed.link.set(link.conditions);
             }
         };
         set(Begins::First);

@@ -291,7 +291,7 @@ impl<'a> Operator<'a> {
             }
             Event::ContextMenu => self.open_menu(source),
             Event::LostCapture if source == Source::Gamepad => {
-                drop(self.browser.value("test.plug(false)"))
+                drop(self.browser.value("test.plug(false)"));
             }
             Event::LostCapture => {
                 let release =
@@ -379,7 +379,7 @@ impl<'a> Operator<'a> {
         } else {
             let place = self.browser.value(OF_THE_MAP);
             let place = (place["x"].as_f64().unwrap(), place["y"].as_f64().unwrap());
-            let (x, y) = self.to_screen(place);
+            let (x, y) = self.on_display(place);
             self.bed
                 .display
                 .input(&format!("mousemove {x} {y} click 3"));
@@ -424,10 +424,10 @@ impl<'a> Operator<'a> {
     /// The middle of an element on the display.
     fn on_screen(&mut self, selector: &str) -> (i64, i64) {
         let middle = self.middle(selector);
-        self.to_screen(middle)
+        self.on_display(middle)
     }
 
-    fn to_screen(&mut self, (x, y): (f64, f64)) -> (i64, i64) {
+    fn on_display(&mut self, (x, y): (f64, f64)) -> (i64, i64) {
         let edges =
             "[screenX + (outerWidth - innerWidth) / 2, screenY + outerHeight - innerHeight]";
         let edges = self.browser.value(edges);

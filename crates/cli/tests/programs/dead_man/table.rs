@@ -22,7 +22,7 @@ type Part = fn(&mut Measurement<'_>, &mut Figures, &mut Vec<Cell>);
 #[ignore = "takes a quarter of an hour: .ci/dead-man keys"]
 fn keys() {
     check("keys", |measurement, figures, cells| {
-        events(Source::Keys, measurement, figures, cells)
+        events(Source::Keys, measurement, figures, cells);
     });
 }
 
@@ -30,7 +30,7 @@ fn keys() {
 #[ignore = "takes a quarter of an hour: .ci/dead-man mouse"]
 fn mouse() {
     check("mouse", |measurement, figures, cells| {
-        events(Source::Mouse, measurement, figures, cells)
+        events(Source::Mouse, measurement, figures, cells);
     });
 }
 
@@ -38,7 +38,7 @@ fn mouse() {
 #[ignore = "takes a quarter of an hour: .ci/dead-man touch"]
 fn touch() {
     check("touch", |measurement, figures, cells| {
-        events(Source::Touch, measurement, figures, cells)
+        events(Source::Touch, measurement, figures, cells);
     });
 }
 
@@ -46,7 +46,7 @@ fn touch() {
 #[ignore = "takes a quarter of an hour: .ci/dead-man gamepad"]
 fn gamepad() {
     check("gamepad", |measurement, figures, cells| {
-        events(Source::Gamepad, measurement, figures, cells)
+        events(Source::Gamepad, measurement, figures, cells);
     });
 }
 
