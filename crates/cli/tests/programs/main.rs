@@ -10,6 +10,8 @@
 )]
 
 #[cfg(target_os = "linux")]
+mod dead_man;
+#[cfg(target_os = "linux")]
 mod e2e;
 #[cfg(target_os = "linux")]
 mod load;

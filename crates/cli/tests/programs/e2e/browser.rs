@@ -1,6 +1,6 @@
-//! A headless Chromium, controlled through its DevTools protocol over a pipe: it needs no driver
-//! program and no port, and runs in a network namespace. User actions are real input events:
-//! touches and key presses.
+//! Chromium, controlled through its DevTools protocol over a pipe: it needs no driver program and no
+//! port, and runs in a network namespace, headless or on a display. User actions are real input
+//! events: touches and key presses.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use serde_json::{Value, json};
+
+pub(crate) use super::accessible::Accessible;
 
 /// Number of browsers started: each has its own profile.
 static BROWSERS: AtomicU32 = AtomicU32::new(0);
@@ -77,6 +80,10 @@ pub(crate) struct Browser {
     said: Receiver<Value>,
     held_key: Option<HeldKey>,
     session: Option<String>,
+    /// Id of the controlled tab.
+    tab: Value,
+    /// Ids of all tabs that were opened here.
+    tabs: Vec<Value>,
     number: u64,
     profile: PathBuf,
     complaints: Vec<String>,
@@ -85,8 +92,17 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Starts the browser, in a network namespace if one is given.
+    /// Starts a headless browser, in a network namespace if one is given.
     pub(crate) fn start(network: Option<&str>) -> Self {
+        Self::start_with(network, &["--headless=new"], &[])
+    }
+
+    /// Starts a browser with flags and variables of its environment.
+    pub(crate) fn start_with(
+        network: Option<&str>,
+        flags: &[&str],
+        environment: &[(&str, &str)],
+    ) -> Self {
         let number = BROWSERS.fetch_add(1, Ordering::Relaxed);
         let profile = format!("chromium-{}-{number}", std::process::id());
         let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join(profile);
@@ -104,12 +120,8 @@ impl Browser {
             "exec chromium \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1",
             "sh",
         ]);
-        command.args([
-            "--headless=new",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--remote-debugging-pipe",
-        ]);
+        command.args(flags).envs(environment.iter().copied());
+        command.args(["--no-sandbox", "--disable-gpu", "--remote-debugging-pipe"]);
         command.args([
             "--no-first-run",
             "--disable-extensions",
@@ -147,28 +159,69 @@ impl Browser {
             said,
             held_key: None,
             session: None,
+            tab: Value::Null,
+            tabs: Vec::new(),
             number: 0,
             profile,
             complaints: Vec::new(),
             failures: Vec::new(),
         };
-        browser.attach();
+        browser.open_tab();
         browser
     }
 
-    fn attach(&mut self) {
-        let target = self.call("Target.createTarget", &json!({ "url": "about:blank" }));
-        let target = json!({ "targetId": target["targetId"], "flatten": true });
-        let session = self.call("Target.attachToTarget", &target);
+    /// Opens a tab in front of the others, and controls it from now on.
+    pub(crate) fn open_tab(&mut self) {
+        self.tab = self.cover_tab();
+        let target = json!({ "targetId": self.tab, "flatten": true });
+        let session = self.call_browser("Target.attachToTarget", &target);
         self.session = Some(session["sessionId"].as_str().unwrap().to_owned());
         for domain in ["Runtime", "Log", "Page"] {
             self.call(&format!("{domain}.enable"), &json!({}));
         }
     }
 
+    /// Opens an empty tab in front of the controlled one. Returns its id.
+    pub(crate) fn cover_tab(&mut self) -> Value {
+        let blank = json!({ "url": "about:blank" });
+        let tab = self.call_browser("Target.createTarget", &blank)["targetId"].clone();
+        self.tabs.push(tab.clone());
+        tab
+    }
+
+    /// Closes every tab that was opened here.
+    pub(crate) fn close_tabs(&mut self) {
+        self.session = None;
+        for tab in std::mem::take(&mut self.tabs) {
+            // It may be closed already.
+            let _ = self.try_call("Target.closeTarget", &json!({ "targetId": tab }));
+        }
+    }
+
+    /// Closes the controlled tab.
+    pub(crate) fn close_tab(&mut self) {
+        let tab = json!({ "targetId": self.tab });
+        self.call_browser("Target.closeTarget", &tab);
+    }
+
+    /// Kills the browser with all its processes.
+    pub(crate) fn kill(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// Sends a command to the browser rather than to the tab.
+    #[track_caller]
+    fn call_browser(&mut self, method: &str, parameters: &Value) -> Value {
+        let session = self.session.take();
+        let answer = self.call(method, parameters);
+        self.session = session;
+        answer
+    }
+
     /// Sends a command and waits for its answer.
     #[track_caller]
-    fn call(&mut self, method: &str, parameters: &Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, parameters: &Value) -> Value {
         let answer = self.try_call(method, parameters);
         answer.unwrap_or_else(|error| panic!("{method}: {error}"))
     }
@@ -326,12 +379,6 @@ impl Browser {
             self.complaints,
             self.failures
         )
-    }
-
-    /// Sends a command of the DevTools protocol that has no method here.
-    #[track_caller]
-    pub(crate) fn command(&mut self, method: &str, parameters: &Value) -> Value {
-        self.call(method, parameters)
     }
 
     /// Touches the middle of an element, once it is visible and enabled.
@@ -512,7 +559,9 @@ impl Browser {
         let shot = shots.find_map(Result::ok).expect("a picture of the page");
         let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("e2e-screenshots");
         std::fs::create_dir_all(&directory).unwrap();
-        let octets = from_base64(shot["data"].as_str().unwrap());
+        let octets = BASE64_STANDARD
+            .decode(shot["data"].as_str().unwrap())
+            .unwrap();
         std::fs::write(directory.join(name).with_extension("png"), octets).unwrap();
     }
 }
@@ -530,59 +579,6 @@ fn write(commands: &Mutex<ChildStdin>, command: &Value) {
     commands.lock().unwrap().write_all(&octets).unwrap();
 }
 
-/// A node of the accessibility tree.
-#[derive(Debug)]
-pub(crate) struct Accessible {
-    pub(crate) role: String,
-    pub(crate) name: String,
-    pub(crate) is_focusable: bool,
-    /// `polite` or `assertive` for a live region; empty otherwise.
-    pub(crate) live: String,
-    /// All text in it.
-    pub(crate) text: String,
-}
-
-impl Accessible {
-    fn of(node: &Value, nodes: &[Value]) -> Self {
-        let text = |value: &Value| {
-            value["value"]
-                .as_str()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
-        };
-        let properties = node["properties"].as_array().into_iter().flatten();
-        let property = |name: &str| {
-            let mut named = properties.clone().filter(|it| it["name"] == name);
-            named
-                .next()
-                .map(|it| it["value"].clone())
-                .unwrap_or_default()
-        };
-        let live = text(&property("live"));
-        Self {
-            role: text(&node["role"]),
-            name: text(&node["name"]),
-            is_focusable: property("focusable")["value"] == true,
-            live: if live == "off" { String::new() } else { live },
-            text: text_within(node, nodes),
-        }
-    }
-}
-
-fn text_within(node: &Value, nodes: &[Value]) -> String {
-    if node["role"]["value"] == "StaticText" {
-        return node["name"]["value"]
-            .as_str()
-            .unwrap_or_default()
-            .to_owned();
-    }
-    let ids = node["childIds"].as_array().into_iter().flatten();
-    let children = ids.filter_map(|id| nodes.iter().find(|it| it["nodeId"] == *id));
-    let texts: Vec<_> = children.map(|it| text_within(it, nodes)).collect();
-    texts.join(" ")
-}
-
 impl Drop for Browser {
     fn drop(&mut self) {
         self.stop_repeats();
@@ -590,18 +586,4 @@ impl Drop for Browser {
         let _ = self.child.wait();
         let _ = std::fs::remove_dir_all(&self.profile);
     }
-}
-
-/// Decodes Base64, the encoding of screenshots.
-fn from_base64(text: &str) -> Vec<u8> {
-    let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let digits = text
-        .bytes()
-        .filter_map(|letter| alphabet.iter().position(|it| *it == letter));
-    let digits: Vec<usize> = digits.collect();
-    let groups = digits.chunks(4).flat_map(|group| {
-        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
-        (0..group.len() - 1).map(move |octet| (bits >> (16 - 8 * octet)) as u8)
-    });
-    groups.collect()
 }

@@ -75,17 +75,17 @@ const ENDINGS: [Ending; 9] = [
         let (x, y) = middle(page, "#map");
         for kind in ["mousePressed", "mouseReleased"] {
             let event = json!({ "type": kind, "x": x, "y": y, "button": "right", "clickCount": 1 });
-            page.command("Input.dispatchMouseEvent", &event);
+            page.call("Input.dispatchMouseEvent", &event);
         }
     }),
     ("another tab", |page| {
-        let other = page.command("Target.createTarget", &json!({ "url": "about:blank" }));
+        let other = page.call("Target.createTarget", &json!({ "url": "about:blank" }));
         page.wait("document.hidden || !document.hasFocus()");
-        page.command(
+        page.call(
             "Target.closeTarget",
             &json!({ "targetId": other["targetId"] }),
         );
-        page.command("Page.bringToFront", &json!({}));
+        page.call("Page.bringToFront", &json!({}));
         page.wait("!document.hidden");
     }),
     ("a rotated screen", |page| {
@@ -246,7 +246,7 @@ fn a_second_finger_stops_in_an_emergency(page: &mut Browser) {
         ("touchEnd", json!([button])),
     ] {
         let event = json!({ "type": kind, "touchPoints": points });
-        page.command("Input.dispatchTouchEvent", &event);
+        page.call("Input.dispatchTouchEvent", &event);
     }
     page.wait("document.body.dataset.emergency === 'stopped'");
     is_idle(page, "emergency");
@@ -267,5 +267,5 @@ fn touch(page: &mut Browser, kind: &str, place: Option<(f64, f64)>) {
         .map(|(x, y)| json!({ "x": x, "y": y }))
         .collect();
     let event = json!({ "type": kind, "touchPoints": points });
-    page.command("Input.dispatchTouchEvent", &event);
+    page.call("Input.dispatchTouchEvent", &event);
 }

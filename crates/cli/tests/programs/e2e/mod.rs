@@ -5,8 +5,9 @@
 //! They need Chromium and network namespaces. Without these, the tests report this prominently and
 //! pass, but fail if `JAUS_EVIDENCE=required` is set.
 
+mod accessible;
 mod base_map;
-mod browser;
+pub(crate) mod browser;
 mod by_hand;
 mod fleet;
 mod handover;
@@ -14,7 +15,7 @@ mod input;
 mod keyboard;
 mod pictures;
 mod steps;
-mod system;
+pub(crate) mod system;
 mod truth;
 #[cfg(feature = "https")]
 mod users;
@@ -30,10 +31,10 @@ use self::steps::{emergency, look_from_all_screens, take_control};
 use self::system::{PAGE, System};
 
 /// Destinations beyond the obstacles of the demo map, in metres north and east of the origin.
-const FAR: (f64, f64) = (4.5, 1.5);
-const FAR_BACK: (f64, f64) = (-4.5, -1.5);
+pub(crate) const FAR: (f64, f64) = (4.5, 1.5);
+pub(crate) const FAR_BACK: (f64, f64) = (-4.5, -1.5);
 /// Speed of missions that a test ends on the way, in m/s: no machine is too slow to do so before they arrive.
-const SLOW: f64 = 0.2;
+pub(crate) const SLOW: f64 = 0.2;
 
 #[test]
 fn a_mission_through_the_page_ends_by_the_death_of_the_planner_and_by_a_key() {
@@ -186,7 +187,7 @@ fn comes_alive(page: &mut Browser) {
 }
 
 /// Touches the map, corrects the destination by hand, and waits for a route.
-fn plan(page: &mut Browser, (north, east): (f64, f64), speed: Option<f64>) {
+pub(crate) fn plan(page: &mut Browser, (north, east): (f64, f64), speed: Option<f64>) {
     page.press("[data-show=mission]");
     page.press("#map");
     page.wait("document.querySelector('#destination-x').value !== ''");
@@ -205,7 +206,7 @@ fn plan(page: &mut Browser, (north, east): (f64, f64), speed: Option<f64>) {
     page.wait(planned);
 }
 
-fn approve(page: &mut Browser) {
+pub(crate) fn approve(page: &mut Browser) {
     page.press("#approve");
     page.wait(
         "document.querySelector('#stages [aria-current] .stage-name')?.textContent === 'Driving'",

@@ -64,6 +64,8 @@ pub(crate) fn program(name: &str) -> PathBuf {
 pub(crate) struct System {
     names: [String; 4],
     directory: PathBuf,
+    /// Flags of programs that replace the usual ones.
+    flags: BTreeMap<&'static str, Vec<String>>,
     running: RefCell<BTreeMap<&'static str, Child>>,
 }
 
@@ -79,6 +81,7 @@ impl System {
         let system = Self {
             names: HOSTS.map(|host| format!("jaus-{number}-{host}")),
             directory: Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("system-{number}")),
+            flags: BTreeMap::new(),
             running: RefCell::default(),
         };
         for name in &system.names {
@@ -122,11 +125,18 @@ impl System {
         Ok(system)
     }
 
+    /// Replaces the usual flags of a program.
+    pub(crate) fn with_flags(mut self, program: &'static str, flags: &[&str]) -> Self {
+        let flags = flags.iter().map(|&flag| flag.to_owned());
+        self.flags.insert(program, flags.collect());
+        self
+    }
+
     fn name(&self, host: Host) -> &str {
         &self.names[host as usize]
     }
 
-    /// The network namespace of the operator's browser.
+    /// The network namespace of the operator's station and, usually, browser.
     pub(crate) fn operator(&self) -> &str {
         self.name(Host::Operator)
     }
@@ -147,7 +157,6 @@ impl System {
 
     /// Starts all programs.
     pub(crate) fn start_all(&self) {
-        std::fs::create_dir_all(&self.directory).unwrap();
         for (name, ..) in PROGRAMS {
             self.start(name);
         }
@@ -161,6 +170,8 @@ impl System {
     /// Starts a program on its host, in a directory for its files and its log.
     pub(crate) fn start(&self, wanted: &'static str) {
         let (name, host, flags) = PROGRAMS.iter().find(|(name, ..)| *name == wanted).unwrap();
+        let usual: Vec<_> = flags.iter().map(|&flag| flag.to_owned()).collect();
+        let flags = self.flags.get(name).unwrap_or(&usual);
         let directory = self.directory.join(name);
         std::fs::create_dir_all(&directory).unwrap();
         let log = File::options()
@@ -171,7 +182,7 @@ impl System {
         let child = Command::new("ip")
             .args(["netns", "exec", self.name(*host)])
             .arg(program(name))
-            .args(*flags)
+            .args(flags)
             .args([
                 "--name",
                 if matches!(host, Host::Operator) {

@@ -1,0 +1,208 @@
+//! The whole table: sources and events in rows, links in columns.
+
+use std::time::Duration;
+
+use jaus_test_kit::figures::Figures;
+
+use super::cell::{Cell, Ending, Link, Measurement};
+use super::operator::{Event, Source, Stop};
+use super::{all_are_met, on_a_bed};
+
+/// How often the operator stops the vehicle at once over each lossy link.
+const STOPS: usize = 200;
+/// How long something is held before the operator stops the vehicle at once.
+const HELD: [Duration; 2] = [Duration::from_secs(2), Duration::from_secs(12)];
+/// Links of the table in its order.
+const LINKS: [Link; 7] = Link::ALL;
+
+/// A part of the table: measures it into its figures.
+type Part = fn(&mut Measurement<'_>, &mut Figures, &mut Vec<Cell>);
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man keys"]
+fn keys() {
+    check("keys", |measurement, figures, cells| {
+        events(Source::Keys, measurement, figures, cells);
+    });
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man mouse"]
+fn mouse() {
+    check("mouse", |measurement, figures, cells| {
+        events(Source::Mouse, measurement, figures, cells);
+    });
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man touch"]
+fn touch() {
+    check("touch", |measurement, figures, cells| {
+        events(Source::Touch, measurement, figures, cells);
+    });
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: .ci/dead-man gamepad"]
+fn gamepad() {
+    check("gamepad", |measurement, figures, cells| {
+        events(Source::Gamepad, measurement, figures, cells);
+    });
+}
+
+#[test]
+#[ignore = "takes ten minutes: .ci/dead-man stops"]
+fn stops() {
+    check("stops", emergency_stops);
+}
+
+#[test]
+#[ignore = "takes five minutes: .ci/dead-man missions"]
+fn missions() {
+    check("missions", stopped_missions);
+}
+
+#[test]
+#[ignore = "takes an hour: .ci/dead-man loss"]
+fn loss() {
+    check("loss", lossy_stops);
+}
+
+#[test]
+#[ignore = "takes five minutes: .ci/dead-man refused"]
+fn refused() {
+    check("refused", refusals);
+}
+
+/// Measures a part of the table, writes it if that is requested, and requires that every cell meets its limit.
+fn check(name: &str, part: Part) {
+    on_a_bed(|bed| {
+        let command = format!(".ci/dead-man {name}");
+        let mut figures = Figures::new(&format!("dead-man-{name}"), &command);
+        let mut cells = Vec::new();
+        part(&mut Measurement::new(bed), &mut figures, &mut cells);
+        figures.finish();
+        all_are_met(&cells);
+    });
+}
+
+fn head(figures: &mut Figures, title: &str, what: &str) {
+    let [a, b, c, d, e, f, g] = LINKS.map(|it| it.name);
+    figures.table(title, [what, a, b, c, d, e, f, g]);
+}
+
+/// Measures a row: one cell for each link.
+fn row(
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+    name: &str,
+    measure: impl FnMut(Link) -> Cell,
+) {
+    let measured = LINKS.map(measure);
+    let [a, b, c, d, e, f, g] = measured.each_ref().map(ToString::to_string);
+    figures.row([name, &a, &b, &c, &d, &e, &f, &g]);
+    cells.extend(measured);
+}
+
+fn events(
+    source: Source,
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
+    let title = format!("Driving by hand: {}", source.name());
+    head(figures, &title, "what happens");
+    let happens = Event::ALL.into_iter().filter(|it| it.can_happen_to(source));
+    for event in happens {
+        row(figures, cells, event.name(), |link| {
+            measurement.event(source, event, link)
+        });
+    }
+}
+
+fn emergency_stops(
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
+    head(figures, "Driving by hand: emergency stop", "how");
+    for held in HELD {
+        for (source, stop, name) in [
+            (Source::Keys, Stop::Escape, "Esc, a key held"),
+            (Source::Touch, Stop::RedButton, "red button, the stick held"),
+            (
+                Source::Gamepad,
+                Stop::PadButton,
+                "B of the gamepad, it is held",
+            ),
+        ] {
+            let name = format!("{name} for {} s", held.as_secs());
+            row(figures, cells, &name, |link| {
+                measurement.stop(source, stop, link, held)
+            });
+        }
+    }
+}
+
+fn stopped_missions(
+    measurement: &mut Measurement<'_>,
+    figures: &mut Figures,
+    cells: &mut Vec<Cell>,
+) {
+    head(figures, "Mission: emergency stop", "how");
+    for (stop, name) in [(Stop::Escape, "Esc"), (Stop::RedButton, "red button")] {
+        row(figures, cells, name, |link| {
+            measurement.stop_mission(stop, link)
+        });
+    }
+}
+
+fn lossy_stops(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+    let title = format!("Emergency stop by Esc while a key is held, {STOPS} times");
+    figures.table(&title, ["link", "median", "p99", "longest", "limit of p99"]);
+    for link in [Link::LOSSY, Link::VERY_LOSSY] {
+        let limit = link.lossy_limit();
+        let measure = |_| measurement.stop(Source::Keys, Stop::Escape, link, Duration::ZERO);
+        let mut all: Vec<Cell> = (0..STOPS).map(measure).collect();
+        all.sort_by_key(Cell::time);
+        let seconds = |index: usize| format!("{:.2} s", all[index].time().as_secs_f64());
+        let [median, p99, longest] = [STOPS / 2, STOPS * 99 / 100 - 1, STOPS - 1];
+        figures.row([
+            link.name,
+            &seconds(median),
+            &seconds(p99),
+            &seconds(longest),
+            &format!("{:.2} s", limit.as_secs_f64()),
+        ]);
+        cells.push(all.swap_remove(p99).with_limit(limit));
+    }
+}
+
+fn refusals(measurement: &mut Measurement<'_>, figures: &mut Figures, cells: &mut Vec<Cell>) {
+    figures.table(
+        "Links that are too slow",
+        [
+            "source",
+            "0.8 s",
+            "1.5 s",
+            "0.8 s while driving",
+            "1.5 s while driving",
+        ],
+    );
+    for source in Source::ALL {
+        let measured = Link::REFUSED.map(|link| measurement.event(source, Event::Release, link));
+        let [a, b, c, d] = measured.each_ref().map(ToString::to_string);
+        figures.row([source.name(), &a, &b, &c, &d]);
+        cells.extend(measured);
+    }
+}
+
+impl Cell {
+    /// When the motors stopped.
+    fn time(&self) -> Duration {
+        match &self.ending {
+            Ending::Stopped(stopped) => stopped.command.unwrap_or(Duration::MAX),
+            Ending::StoppedBefore(_) | Ending::Refused => Duration::ZERO,
+        }
+    }
+}
