@@ -2,6 +2,7 @@
 //! network and no clock.
 
 mod part;
+mod snapshot;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,9 +12,9 @@ pub(super) use self::part::{Depth, Part};
 use super::georeference::Georeference;
 use super::map_overlay::MapOverlay;
 use super::missing::{Absence, GonePart, GoneParts};
-use super::report::{Mission, MissionStage, Report};
+use super::report::{Mission, Report};
 use super::role::Role;
-use super::state::{self, age};
+use super::state;
 use super::stop_monitor::StopMonitor;
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, SampleAge, State};
@@ -350,22 +351,6 @@ impl Picture {
         }
     }
 
-    fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
-        let describe = |(id, name, how): (JausId, &str, Absence)| {
-            let part = self.parts.get(&id).map(|it| (it.role, it.heard));
-            let gone = || self.gone.get(id).map(|it| (it.role, it.heard));
-            let (role, heard) = part.or_else(gone).unwrap_or((Role::Other, None));
-            state::Missing {
-                id: id.to_string(),
-                role: role.name(),
-                name: name.to_owned(),
-                how: how.name(),
-                age_ms: heard.map(|at| age(now, at)),
-            }
-        };
-        self.missing(now).map(describe).collect()
-    }
-
     /// The planner, if it was lost or has restarted while it drove. When all parts are silent, the network is to
     /// blame, and the planner does not count as lost.
     pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
@@ -458,90 +443,6 @@ impl Picture {
         })
     }
 
-    /// The overlay of the map for a page that has the zones of a revision.
-    pub(super) fn overlay_state(&self, known_zones: u32) -> state::Overlay {
-        self.overlay.state(known_zones)
-    }
-
-    /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
-    pub(super) fn vehicle_state(
-        &self,
-        now: Instant,
-        emergency_wanted: bool,
-        obstacle: impl Fn(JausId) -> Option<String>,
-    ) -> Option<state::VehicleState> {
-        let is_known = self.directory.subsystem(self.vehicle).is_some();
-        if !is_known && self.is_empty() {
-            return None;
-        }
-        let mut parts: Vec<_> = self.parts.iter().collect();
-        parts.sort_by_key(|(id, part)| (part.role, **id));
-        let describe =
-            |(id, part): (&JausId, &Part)| self.part_state(now, *id, part, obstacle(*id));
-        let any = self.in_emergency().next().is_some();
-        let all = any && self.not_in_emergency(now).next().is_none();
-        Some(state::VehicleState {
-            subsystem: self.vehicle,
-            name: self.name.clone(),
-            pose: self.pose.map(|known| state::Pose {
-                age_ms: age(now, known.at),
-                ..known.what
-            }),
-            place: self.georeference.state(now),
-            velocity: self.velocity.map(|known| state::Velocity {
-                age_ms: age(now, known.at),
-                ..known.what
-            }),
-            parts: parts.into_iter().map(describe).collect(),
-            missing: self.missing_state(now),
-            stale: self.stale(now),
-            emergency: if emergency_wanted { all } else { any },
-            at_rest: self.at_rest(now),
-            runaway: self.is_runaway(now),
-            held: self.hold_reason(now),
-            overlay: self.overlay.revision(now),
-        })
-    }
-
-    /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
-    /// state whether the station controls it, and is requested to hand it over.
-    pub(super) fn fleet_state(
-        &self,
-        now: Instant,
-        driver: String,
-        (held, requested): (bool, bool),
-    ) -> state::FleetVehicle {
-        let principal = self.principal().and_then(|id| self.parts.get(&id));
-        let status = principal.and_then(|part| part.status);
-        let presence = match principal {
-            None if self.is_empty() => "unknown",
-            None => "gone",
-            Some(part) if part.is_silent(now, self.depth.silent()) => "silent",
-            Some(_) => "present",
-        };
-        let holder = self.holder();
-        let mission = self.mission().map(|it| it.stage);
-        let heard = self.parts.values().filter_map(|part| part.heard);
-        let heard = heard.chain(self.gone.iter().filter_map(|(_, part)| part.heard));
-        let heard = heard.max();
-        state::FleetVehicle {
-            subsystem: self.vehicle,
-            name: self.name.clone(),
-            driver,
-            presence,
-            state: status.map(|known| state_name(known.what)),
-            speed: self.fresh_velocity(now).and_then(|it| it.x),
-            at_rest: self.at_rest(now),
-            runaway: self.is_runaway(now),
-            controller: holder.map(|(id, _)| id.to_string()),
-            authority: holder.map(|(_, authority)| authority),
-            held,
-            requested,
-            mission: mission.filter(|it| !it.is_over()).map(MissionStage::name),
-            age_ms: heard.map(|at| age(now, at)),
-        }
-    }
-
     /// The operator in control of the vehicle with the greatest authority. The vehicle's own parts
     /// control each other during a mission, which does not count.
     pub(super) fn holder(&self) -> Option<(JausId, u8)> {
@@ -562,54 +463,6 @@ impl Picture {
             let component = self.directory.component(*id);
             component.is_some_and(|it| it.offers(enhanced_access_control::URN))
         })
-    }
-
-    fn part_state(
-        &self,
-        now: Instant,
-        id: JausId,
-        part: &Part,
-        obstacle: Option<String>,
-    ) -> state::Part {
-        let controller = part.controller.and_then(|known| known.what);
-        state::Part {
-            id: id.to_string(),
-            role: part.role.name(),
-            managed: part.managed,
-            state: part.status.map(|known| state_name(known.what)),
-            state_age_ms: part.status.map(|known| age(now, known.at)),
-            controller: controller.map(|(id, _)| id.to_string()),
-            authority: controller.map(|(_, authority)| authority),
-            ours: controller.is_some_and(|(id, _)| id == self.own),
-            obstacle,
-            stage: part.stage.clone(),
-            age_ms: part.heard.map(|at| age(now, at)),
-        }
-    }
-
-    /// Snapshot of the mission with its path, also of a planner lost while driving. `told_to_stop`
-    /// states whether the drivers were stopped for that reason.
-    pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
-        let known = self.mission.as_ref()?;
-        let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
-            id: id.to_string(),
-            how: how.name(),
-            told_to_stop,
-        });
-        let is_known = lost.is_some() || self.parts.contains_key(&known.by);
-        is_known.then(|| state::Mission {
-            path: self.path.clone(),
-            age_ms: age(now, known.at),
-            lost,
-            ..known.what.state()
-        })
-    }
-
-    /// The map to show: the planner's map, or the first.
-    pub(super) fn map_state(&self) -> Option<state::Map> {
-        let traversability = |map: &&state::Map| map.name == "traversability";
-        let map = self.maps.iter().find(traversability);
-        map.or_else(|| self.maps.first()).cloned()
     }
 }
 

@@ -3,52 +3,19 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
+use super::Introduction;
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, QueryIncarnation, QueryStatus, QueryTimeout, RejectControl,
-    ReleaseControl, ReportControl, ReportStatus, ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
+    ReportControl, ReportStatus, ReportTimeout, RequestControl,
 };
-use crate::service::{Directory, Handled, Incarnation, NoAnswer, Outbox, Patience, code_of, read};
+use crate::service::{Handled, Incarnation, NoAnswer, Outbox, Patience, code_of, read};
 
 /// Identifies one request for control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ControlId(u64);
-
-/// How a client tells its incarnation to the peer that it requests control of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::service) enum Introduction {
-    /// The peer does not offer [`Incarnation`].
-    None,
-    /// Before the first request: whether the peer offers it is not known.
-    Once(Incarnation),
-    /// Before each request until the peer has told its own.
-    Always(Incarnation),
-}
-
-impl Introduction {
-    /// That of a client to this peer.
-    pub(in crate::service) fn new(own: Incarnation, directory: &Directory, peer: JausId) -> Self {
-        match Incarnation::is_offered_by(directory, peer) {
-            Some(false) => Self::None,
-            None => Self::Once(own),
-            Some(true) => Self::Always(own),
-        }
-    }
-
-    /// What to send before a request.
-    const fn take(&mut self) -> Option<QueryIncarnation> {
-        match *self {
-            Self::None => None,
-            Self::Once(own) => {
-                *self = Self::None;
-                Some(own.query())
-            }
-            Self::Always(own) => Some(own.query()),
-        }
-    }
-}
 
 /// The progress of a request for control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,6 +5,7 @@
 //! see the component's incoming messages and send on its behalf. A [`Stack`](super::Stack) owns them.
 
 mod control;
+mod introduction;
 mod news;
 mod rejection;
 mod session;
@@ -15,7 +16,8 @@ mod tests;
 mod topic;
 
 pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
-pub(super) use control::{Controls, Introduction};
+pub(super) use control::Controls;
+pub(super) use introduction::Introduction;
 pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
 pub use session::{
