@@ -88,7 +88,7 @@ impl Sensor {
 #[test]
 fn a_stamp_that_is_no_time_and_the_stamp_0_are_none() {
     assert_eq!(SampleStamp::of_report(TimeStamp::default(), None), None);
-    let wrong = TimeStamp::default().with_hour(31).unwrap();
+    let wrong = TimeStamp(u32::MAX);
     assert_eq!(SampleStamp::of_report(wrong, None), None);
     let stamp = TimeStamp::default().with_day(2).unwrap();
     let stamp = stamp.with_milliseconds(7).unwrap();

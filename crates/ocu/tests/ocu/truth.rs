@@ -1,7 +1,7 @@
 //! Pages learn what a vehicle does and why: its surroundings, whether it is at rest, and the log of
 //! events.
 
-use jaus::component::{Component, Handlers, Kind, Management};
+use jaus::component::{AccessControl, Component, Handlers, Kind, Management};
 use jaus::messages::mobility::set_local_operating_zone::{LocalPolygonPointRec, X, Y};
 use jaus::messages::mobility::{
     DeleteZone, QueryExcursion, QueryLocalOperatingZone, QueryVelocityState, QueryVelocityStateExt,
@@ -63,7 +63,7 @@ async fn a_page_gets_the_zones_once_and_the_points_that_the_range_sensor_sees() 
         range: 2.0,
     };
     sensor.publish(Some(&Scan::new((-45..=45).map(ahead))), SystemTime::now());
-    let builder = Component::builder(Kind::Vehicle, "Rover");
+    let builder = Component::builder(Kind::Vehicle, "Rover").access_control(AccessControl::new());
     let _sensor = scene.attach(54, builder.offer(sensor.service()));
     let mut page = scene.page().await;
     page.select(101).await;
