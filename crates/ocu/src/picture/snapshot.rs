@@ -11,12 +11,12 @@ use jaus::address::JausId;
 
 impl Picture {
     /// The overlay of the map for a page that has the zones of a revision.
-    pub(super) fn overlay_state(&self, known_zones: u32) -> state::Overlay {
+    pub(crate) fn overlay_state(&self, known_zones: u32) -> state::Overlay {
         self.overlay.state(known_zones)
     }
 
     /// Snapshot of the vehicle. `obstacle` returns why a part is not under control.
-    pub(super) fn vehicle_state(
+    pub(crate) fn vehicle_state(
         &self,
         now: Instant,
         emergency_wanted: bool,
@@ -57,7 +57,7 @@ impl Picture {
 
     /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
     /// state whether the station controls it, and is requested to hand it over.
-    pub(super) fn fleet_state(
+    pub(crate) fn fleet_state(
         &self,
         now: Instant,
         driver: String,
@@ -119,7 +119,7 @@ impl Picture {
 
     /// Snapshot of the mission with its path, also of a planner lost while driving. `told_to_stop`
     /// states whether the drivers were stopped for that reason.
-    pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
+    pub(crate) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
         let known = self.mission.as_ref()?;
         let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
             id: id.to_string(),
@@ -136,7 +136,7 @@ impl Picture {
     }
 
     /// The map to show: the planner's map, or the first.
-    pub(super) fn map_state(&self) -> Option<state::Map> {
+    pub(crate) fn map_state(&self) -> Option<state::Map> {
         let traversability = |map: &&state::Map| map.name == "traversability";
         let map = self.maps.iter().find(traversability);
         map.or_else(|| self.maps.first()).cloned()
