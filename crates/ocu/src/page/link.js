@@ -232,6 +232,7 @@ export class Link extends EventTarget {
           vehicleLossPercent: number(frame.vehicle_loss_percent),
           wayBack: frame.way_back === true,
         };
+        this.#flow.estimate(this.#quality.roundTripMs);
         break;
       case "fleet":
       case "tree":
