@@ -13,26 +13,31 @@ const STUCK = 1_000;
 const PERIOD = 100;
 /** Most setpoints under way: the station refuses links that would need more. */
 const MOST = 8;
-/** For how long a round trip counts. */
-const MEMORY = 10_000;
+/** The idle link's round trip grows by this part of the time at most: a link that is never idle looks like a long one. */
+const FOLLOWS = 0.01;
 /** A confirmation that is later than an idle link's by this has met a queue or a loss. */
 const DELAYED = 100;
 /** So many late confirmations in a row are no single loss, nor a page that stood still for a moment. */
 const QUEUED = 2;
+/** A link that queues rests for so many times the delay after each setpoint: a stop must not wait behind them. */
+const PAUSE = 2;
+const LONGEST_PAUSE = 2_000;
 
 export class Flow {
   #transmit;
   #now;
   /** When the drives and releases that the station has not confirmed were sent, oldest first. */
   #underWay = [];
-  /** Round trips of the last confirmations, each with its time. */
-  #roundTrips = [];
-  /** What the station knows of the round trip, for the first setpoints. */
+  /** The round trip of the idle link, and when it was measured; null before the first confirmation. */
+  #idle = null;
+  /** What the station knows of it, for the first setpoints. */
   #estimate = 0;
   /** How many confirmations in a row were late. */
   #late = 0;
   /** Most setpoints under way as long as a queue is feared. */
   #most = MOST;
+  /** Until then the link rests. */
+  #restsUntil = 0;
   /** The setpoint that is sent next. */
   #waiting = null;
   /** Whether a setpoint was sent since the last release. */
@@ -51,8 +56,8 @@ export class Flow {
 
   /** Forgets everything: the connection is new. */
   reset() {
-    [this.#underWay, this.#roundTrips] = [[], []];
-    [this.#estimate, this.#late, this.#most] = [0, 0, MOST];
+    [this.#underWay, this.#idle] = [[], null];
+    [this.#estimate, this.#late, this.#most, this.#restsUntil] = [0, 0, MOST, 0];
     this.#waiting = this.#seen = null;
     this.#driving = this.#unconfirmed = false;
   }
@@ -124,24 +129,19 @@ export class Flow {
 
   /** Whether one more setpoint under way would not have to wait. */
   #mayDrive() {
-    const useful = 1 + Math.floor(this.#shortest() / PERIOD);
-    return this.#underWay.length < Math.min(useful, this.#most);
+    const useful = 1 + Math.floor((this.#idle?.roundTrip ?? this.#estimate) / PERIOD);
+    return this.#underWay.length < Math.min(useful, this.#most) && this.#now() >= this.#restsUntil;
   }
 
-  /** One at a time when the link queues, and then more again while confirmations are prompt. */
+  /** One at a time and with pauses when the link queues, and then more again while confirmations are prompt. */
   #measure(roundTrip) {
-    this.#roundTrips.push({ at: this.#now(), roundTrip });
-    this.#late = roundTrip > this.#shortest() + DELAYED ? this.#late + 1 : 0;
-    if (this.#late >= QUEUED) this.#most = 1;
-    else if (this.#late === 0) this.#most = Math.min(this.#most + 1, MOST);
-  }
-
-  /** The round trip of an idle link, as far as known. */
-  #shortest() {
     const now = this.#now();
-    while (this.#roundTrips.length && now - this.#roundTrips[0].at > MEMORY) this.#roundTrips.shift();
-    if (this.#roundTrips.length === 0) return this.#estimate;
-    return Math.min(...this.#roundTrips.map((it) => it.roundTrip));
+    const grown = this.#idle ? this.#idle.roundTrip + FOLLOWS * Math.min(1_000, now - this.#idle.at) : Infinity;
+    this.#idle = { at: now, roundTrip: Math.min(roundTrip, grown) };
+    const delay = roundTrip - this.#idle.roundTrip;
+    this.#late = delay > DELAYED ? this.#late + 1 : 0;
+    if (this.#late >= QUEUED) [this.#most, this.#restsUntil] = [1, now + Math.min(PAUSE * delay, LONGEST_PAUSE)];
+    else if (this.#late === 0) this.#most = Math.min(this.#most + 1, MOST);
   }
 
   #held() {

@@ -9,7 +9,7 @@ const LONGEST_PAUSE = 8_000;
 /** A state older than this is stale. */
 export const STALE = 1_000;
 /** A connection that says nothing for so long is given up. */
-const DEAD = 5_000;
+const DEAD = 10_000;
 /** More waiting than this means that the network does not take what we say. */
 const BACKLOG = 16_384;
 /** A state is not waited for to be drawn longer than this. */
