@@ -58,10 +58,18 @@ pub struct PageLink {
     /// When a confirmation last arrived.
     heard: Option<Instant>,
     samples: VecDeque<Sample>,
+    /// The round trip of the idle link, by which states are paced, and when it was measured. It follows
+    /// a longer one slowly: a link that is never idle looks like a long one.
+    idle: Option<Sample>,
     /// How many states may be under way.
     window: usize,
     /// Until then the window does not grow.
     hold_until: Option<Instant>,
+    /// How many confirmations in a row were late.
+    late: u32,
+    /// Least time between frames, and when the last one was sent.
+    pause: Duration,
+    last: Option<Instant>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -84,8 +92,12 @@ impl Default for PageLink {
             arrived: None,
             heard: None,
             samples: VecDeque::new(),
+            idle: None,
             window: 1,
             hold_until: None,
+            late: 0,
+            pause: Duration::ZERO,
+            last: None,
         }
     }
 }
@@ -103,6 +115,15 @@ impl PageLink {
     const PROMPT: Duration = Duration::from_millis(50);
     /// After a queue, for this time no more states are sent at once.
     const CAUTION: Duration = Duration::from_secs(2);
+    /// So many late confirmations in a row are no single loss.
+    const QUEUED: u32 = 2;
+    /// A link that queues rests for so many times the delay after each frame.
+    const PAUSE: u32 = 3;
+    const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+    /// The idle link's round trip grows by this part of the time at most: 10 ms in a second.
+    const FOLLOWS: u32 = 100;
+    /// Interval of states.
+    const PERIOD: Duration = Duration::from_millis(100);
     /// Most states under way: those of one second.
     const MOST_UNDER_WAY: usize = 10;
     /// Most round trips kept.
@@ -110,11 +131,19 @@ impl PageLink {
     /// Without a confirmation for this time, the way back does not work.
     const SILENCE: Duration = Duration::from_secs(1);
 
-    /// Whether the link takes another state now. One is under way at a time, and more only where
-    /// that does not make them wait: on a long link without a queue.
+    /// Whether the link takes another frame now. One state is under way at a time, and more only where
+    /// that does not make them wait: on a long link without a queue. On a link that queues they come
+    /// seldom, because what else the page says must not wait behind confirmations.
     #[must_use]
-    pub fn may_send(&self) -> bool {
-        self.under_way() < self.window
+    pub fn may_send(&self, now: Instant) -> bool {
+        self.under_way() < self.window && self.left(now).is_zero()
+    }
+
+    /// How long the link still has to rest after the last frame.
+    #[must_use]
+    pub fn left(&self, now: Instant) -> Duration {
+        let next = self.last.map_or(now, |it| it + self.pause);
+        next.saturating_duration_since(now)
     }
 
     fn under_way(&self) -> usize {
@@ -129,6 +158,12 @@ impl PageLink {
             vehicle,
             at: now,
         });
+        self.handle_frame(now);
+    }
+
+    /// Notes that a frame is sent which the page does not confirm.
+    pub const fn handle_frame(&mut self, now: Instant) {
+        self.last = Some(now);
     }
 
     /// Handles the confirmation of a state that has arrived, but is not shown.
@@ -208,22 +243,42 @@ impl PageLink {
         }
     }
 
-    /// Sends more states at once while that does not delay them, and one at a time when it does.
+    /// Sends more states at once while that does not delay them, and fewer when it does: one at a time
+    /// and, if that is no single loss, with pauses in which the link is idle.
     fn adapt(&mut self, now: Instant, round_trip: Duration) {
-        let Some(shortest) = self.shortest(now) else {
-            return;
-        };
-        if round_trip > shortest + Self::DELAYED {
+        let idle = self.idle_round_trip(now, round_trip);
+        let delay = round_trip - idle;
+        if delay > Self::DELAYED {
             self.window = 1;
             self.hold_until = Some(now + Self::CAUTION);
-        } else if round_trip <= shortest + Self::PROMPT
-            && self.hold_until.is_none_or(|until| now >= until)
-        {
+            self.late += 1;
+            if self.late >= Self::QUEUED {
+                self.pause = (delay * Self::PAUSE).min(Self::LONGEST_PAUSE);
+            }
+            return;
+        }
+        self.late = 0;
+        self.pause = Duration::ZERO;
+        if delay <= Self::PROMPT && self.hold_until.is_none_or(|until| now >= until) {
             // States that would follow each other faster than they are made need no window.
-            let useful = round_trip.as_millis() / Self::DELAYED.as_millis() + 1;
+            let useful = idle.as_millis() / Self::PERIOD.as_millis() + 1;
             let useful = usize::try_from(useful).unwrap_or(Self::MOST_UNDER_WAY);
             self.window = (self.window + 1).min(useful).min(Self::MOST_UNDER_WAY);
         }
+    }
+
+    /// The round trip of the idle link, after one that has just been measured.
+    fn idle_round_trip(&mut self, now: Instant, round_trip: Duration) -> Duration {
+        let known = self.idle.map_or(round_trip, |it| {
+            let elapsed = now.saturating_duration_since(it.at);
+            it.round_trip + elapsed.min(Self::SILENCE) / Self::FOLLOWS
+        });
+        let round_trip = known.min(round_trip);
+        self.idle = Some(Sample {
+            at: now,
+            round_trip,
+        });
+        round_trip
     }
 
     fn recent(&self, now: Instant) -> impl Iterator<Item = Duration> {
@@ -386,13 +441,16 @@ mod tests {
     #[test]
     fn one_state_is_under_way_until_the_page_confirms_it() {
         let (mut link, now) = (PageLink::default(), Instant::now());
-        assert!(link.may_send());
+        assert!(link.may_send(now));
         link.handle_sent(now, 1, ROVER);
-        assert!(!link.may_send());
+        assert!(!link.may_send(now));
         link.handle_received(now, 7);
-        assert!(!link.may_send(), "another one");
+        assert!(!link.may_send(now), "another one");
         link.handle_received(now + ms(300), 1);
-        assert!(link.may_send(), "it has arrived, though nobody sees it");
+        assert!(
+            link.may_send(now + ms(300)),
+            "it has arrived, though nobody sees it"
+        );
     }
 
     /// States are sent every 100 ms if the link takes them. Returns the most under way in the last
@@ -404,7 +462,7 @@ mod tests {
             while let Some((seq, _)) = arriving.pop_front_if(|(_, at)| *at == time) {
                 link.handle_seen(start + ms(time), seen(seq, 0)).unwrap();
             }
-            if time % 100 == 0 && link.may_send() {
+            if time % 100 == 0 && link.may_send(start + ms(time)) {
                 link.handle_sent(start + ms(time), time, ROVER);
                 busy_until = arrival(time, busy_until);
                 arriving.push_back((time, busy_until));
@@ -419,7 +477,7 @@ mod tests {
     #[test]
     fn a_long_link_carries_ten_states_a_second() {
         let most = most_under_way(|time, _| time + 600);
-        assert!((4..=7).contains(&most), "{most}");
+        assert!((6..=7).contains(&most), "{most}");
     }
 
     #[test]
@@ -427,6 +485,52 @@ mod tests {
         // Every state takes 400 ms of the link.
         let most = most_under_way(|time, busy_until| time.max(busy_until) + 400);
         assert!(most <= 2, "{most}");
+    }
+
+    /// How many states are sent in each second, of a link that takes `slow` ms for each from the fifth
+    /// to the fifteenth second.
+    fn sent_in_each_second(slow: u64) -> Vec<u32> {
+        let (mut link, start) = (PageLink::default(), Instant::now());
+        let (mut busy_until, mut arriving, mut sent) = (0, VecDeque::new(), vec![0; 20]);
+        for time in 0..20_000 {
+            while let Some((seq, _)) = arriving.pop_front_if(|(_, at)| *at == time) {
+                link.handle_seen(start + ms(time), seen(seq, 0)).unwrap();
+            }
+            let now = start + ms(time);
+            if time % 100 == 0 && link.may_send(now) {
+                link.handle_sent(now, time, ROVER);
+                sent[usize::try_from(time / 1000).unwrap()] += 1;
+                let takes = if (5_000..15_000).contains(&time) {
+                    slow
+                } else {
+                    5
+                };
+                busy_until = busy_until.max(time) + takes;
+                arriving.push_back((time, busy_until));
+            }
+        }
+        sent
+    }
+
+    #[test]
+    fn a_link_that_begins_to_queue_carries_a_state_a_second_until_it_is_free_again() {
+        let sent = sent_in_each_second(400);
+        assert_eq!(sent[3..5], [10, 10]);
+        assert!(sent[6..15].iter().all(|it| *it <= 1), "{sent:?}");
+        assert_eq!(sent[17..20], [10, 10, 10], "{sent:?}");
+    }
+
+    #[test]
+    fn a_single_loss_makes_no_pause() {
+        let (mut link, now, seq) = link(20);
+        link.handle_sent(now, seq + 1, ROVER);
+        let heard = now + ms(250);
+        link.handle_seen(heard, seen(seq + 1, 0)).unwrap();
+        assert!(link.may_send(heard));
+        link.handle_sent(heard, seq + 2, ROVER);
+        let heard = heard + ms(250);
+        link.handle_seen(heard, seen(seq + 2, 0)).unwrap();
+        assert!(!link.may_send(heard));
     }
 
     #[test]

@@ -1,6 +1,6 @@
-// Flow control between page and station, so that nothing queues on the way: at most one setpoint is
-// under way, and the newest replaces what waits. Every setpoint says which state the operator has
-// seen last and for how long, so that the station knows how old it is.
+// Flow control between page and station, so that nothing queues on the way: as many setpoints are under
+// way as an idle link's round trip explains, and the newest replaces what waits. Every setpoint says
+// which state the operator has seen last and for how long, so that the station knows how old it is.
 //
 // Frames to the station: [seq, held] confirms that the state `seq` has been shown for `held`
 // milliseconds, [seq] that it has arrived but is not shown, and [seq, held, forward, turn] drives.
@@ -9,14 +9,35 @@
 const LONGEST_WAIT = 200;
 /** Without a confirmation for this long, the station does not receive setpoints. */
 const STUCK = 1_000;
+/** Setpoints follow each other by so much: a round trip of it needs no second one under way. */
+const PERIOD = 100;
+/** Most setpoints under way: the station refuses links that would need more. */
+const MOST = 8;
+/** The idle link's round trip grows by this part of the time at most: a link that is never idle looks like a long one. */
+const FOLLOWS = 0.01;
+/** A confirmation that is later than an idle link's by this has met a queue or a loss. */
+const DELAYED = 100;
+/** So many late confirmations in a row are no single loss, nor a page that stood still for a moment. */
+const QUEUED = 2;
+/** A link that queues rests for so many times the delay after each setpoint: a stop must not wait behind them. */
+const PAUSE = 2;
+const LONGEST_PAUSE = 2_000;
 
 export class Flow {
   #transmit;
   #now;
-  /** Drives and releases that the station has not confirmed. */
-  #underWay = 0;
-  /** When the oldest of them was sent. */
-  #sentAt = 0;
+  /** When the drives and releases that the station has not confirmed were sent, oldest first. */
+  #underWay = [];
+  /** The round trip of the idle link, and when it was measured; null before the first confirmation. */
+  #idle = null;
+  /** What the station knows of it, for the first setpoints. */
+  #estimate = 0;
+  /** How many confirmations in a row were late. */
+  #late = 0;
+  /** Most setpoints under way as long as a queue is feared. */
+  #most = MOST;
+  /** Until then the link rests. */
+  #restsUntil = 0;
   /** The setpoint that is sent next. */
   #waiting = null;
   /** Whether a setpoint was sent since the last release. */
@@ -35,17 +56,23 @@ export class Flow {
 
   /** Forgets everything: the connection is new. */
   reset() {
-    this.#underWay = 0;
+    [this.#underWay, this.#idle] = [[], null];
+    [this.#estimate, this.#late, this.#most, this.#restsUntil] = [0, 0, MOST, 0];
     this.#waiting = this.#seen = null;
     this.#driving = this.#unconfirmed = false;
+  }
+
+  /** The station has measured this round trip, in milliseconds or null. */
+  estimate(roundTrip) {
+    this.#estimate = roundTrip ?? 0;
   }
 
   /** Drives; false if the setpoint cannot reach the station now. */
   setpoint({ forward, turn }) {
     const now = this.#now();
-    if (this.#seen === null || (this.#underWay && now - this.#sentAt > STUCK)) return false;
+    if (this.#seen === null || now - (this.#underWay[0] ?? now) > STUCK) return false;
     this.#waiting = { forward: thousandths(forward), turn: thousandths(turn), at: now };
-    return this.#underWay > 0 || this.#next();
+    return !this.#mayDrive() || this.#next();
   }
 
   /** Ends driving. The release is sent at once, in place of a setpoint that waits. */
@@ -58,10 +85,11 @@ export class Flow {
 
   /** The station has received a setpoint or a release. */
   confirmed() {
-    if (this.#underWay === 0) return;
-    this.#underWay -= 1;
-    this.#sentAt = this.#now();
-    if (this.#underWay === 0 && !this.#next() && this.#unconfirmed) this.#confirm();
+    const sentAt = this.#underWay.shift();
+    if (sentAt === undefined) return;
+    this.#measure(this.#now() - sentAt);
+    if (this.#mayDrive() && this.#next()) return;
+    if (this.#underWay.length === 0 && this.#unconfirmed) this.#confirm();
   }
 
   /** The state `seq` is on the screen. */
@@ -70,7 +98,7 @@ export class Flow {
     this.#seenAt = this.#now();
     this.#unconfirmed = true;
     // While a setpoint is under way the link is busy: the next one confirms the state as well.
-    if (this.#underWay === 0) this.#confirm();
+    if (this.#underWay.length === 0) this.#confirm();
   }
 
   /** The state `seq` has arrived, but the browser shows nothing now. */
@@ -95,8 +123,25 @@ export class Flow {
 
   #send(frame) {
     if (!this.#transmit(frame)) return false;
-    if (this.#underWay++ === 0) this.#sentAt = this.#now();
+    this.#underWay.push(this.#now());
     return true;
+  }
+
+  /** Whether one more setpoint under way would not have to wait. */
+  #mayDrive() {
+    const useful = 1 + Math.floor((this.#idle?.roundTrip ?? this.#estimate) / PERIOD);
+    return this.#underWay.length < Math.min(useful, this.#most) && this.#now() >= this.#restsUntil;
+  }
+
+  /** One at a time and with pauses when the link queues, and then more again while confirmations are prompt. */
+  #measure(roundTrip) {
+    const now = this.#now();
+    const grown = this.#idle ? this.#idle.roundTrip + FOLLOWS * Math.min(1_000, now - this.#idle.at) : Infinity;
+    this.#idle = { at: now, roundTrip: Math.min(roundTrip, grown) };
+    const delay = roundTrip - this.#idle.roundTrip;
+    this.#late = delay > DELAYED ? this.#late + 1 : 0;
+    if (this.#late >= QUEUED) [this.#most, this.#restsUntil] = [1, now + Math.min(PAUSE * delay, LONGEST_PAUSE)];
+    else if (this.#late === 0) this.#most = Math.min(this.#most + 1, MOST);
   }
 
   #held() {

@@ -9,7 +9,7 @@ const LONGEST_PAUSE = 8_000;
 /** A state older than this is stale. */
 export const STALE = 1_000;
 /** A connection that says nothing for so long is given up. */
-const DEAD = 5_000;
+const DEAD = 10_000;
 /** More waiting than this means that the network does not take what we say. */
 const BACKLOG = 16_384;
 /** A state is not waited for to be drawn longer than this. */
@@ -232,6 +232,7 @@ export class Link extends EventTarget {
           vehicleLossPercent: number(frame.vehicle_loss_percent),
           wayBack: frame.way_back === true,
         };
+        this.#flow.estimate(this.#quality.roundTripMs);
         break;
       case "fleet":
       case "tree":

@@ -15,8 +15,9 @@ const KEYS = new Map([
 const KEY_STEP = 0.2;
 /** The first repeat comes so long after the press at the latest: systems wait 0.25 to 0.66 s. */
 const FIRST_REPEAT = 700;
-/** The next repeat comes so long after the one before at the latest: systems repeat 2 to 40 times a second. */
-const NEXT_REPEAT = 500;
+/** The next repeat comes so long after the one before at the latest: systems repeat 3 to 40 times a second. The way
+ * to the motor has the rest of half a second. */
+const NEXT_REPEAT = 400;
 
 /** Keys: alive by the system's own repetition. */
 export class KeySource {
@@ -187,7 +188,7 @@ const UNREAD = 300;
  * was "shoulder down" is noticed on the former here, and on the latter when the system drops it. The price
  * is that a pad that reports changes alone, held quite still, stops: the operator moves the stick a little.
  */
-const UNCHANGED = 500;
+const UNCHANGED = 400;
 
 /** Gamepads: alive by readings whose time stamp changes. The left stick drives while a shoulder button is held. */
 export class GamepadSource {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
-use futures_util::{SinkExt, StreamExt};
+use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::Deserialize;
 use tokio::sync::{Notify, mpsc, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
@@ -453,32 +453,42 @@ impl Writer<'_> {
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut links = interval_at(tokio::time::Instant::now() + LINK, LINK);
         links.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut next = Some(self.hello());
+        let mut next = vec![self.hello()];
         loop {
-            if let Some(message) = next.take() {
-                match timeout(STUCK, sink.send(message)).await {
+            for message in next.drain(..) {
+                match timeout(STUCK, sink.feed(message)).await {
                     Ok(Ok(())) => {}
                     Ok(Err(_)) | Err(_) => return,
                 }
             }
+            match timeout(STUCK, sink.flush()).await {
+                Ok(Ok(())) => {}
+                Ok(Err(_)) | Err(_) => return,
+            }
             // All that is not an answer waits until the link has carried the last state.
-            let may_send = self.visitor.may(UserRole::Observe) && self.link.lock().may_send();
-            next = tokio::select! {
+            let may_watch = self.visitor.may(UserRole::Observe);
+            let (is_free, left) = {
+                let (link, now) = (self.link.lock(), Instant::now());
+                (link.may_send(now), link.left(now))
+            };
+            let may_send = may_watch && is_free;
+            let message = tokio::select! {
                 biased;
                 answer = answers.recv() => match answer {
                     Some(json) => Some(Message::Text(json)),
-                    None => return,
-                },
-                _ = links.tick(), if may_send => Some(self.links()),
-                list = lists.next(), if may_send => match list {
-                    Some(json) => Some(text(&json)),
                     None => return,
                 },
                 changed = self.snapshots.changed(), if may_send => match changed {
                     Ok(()) => self.state(),
                     Err(_) => return,
                 },
+                list = lists.next(), if may_send => match list {
+                    Some(json) => Some(self.unconfirmed(text(&json))),
+                    None => return,
+                },
+                _ = links.tick(), if may_send => Some(self.unconfirmed(self.links())),
                 () = self.link.confirmed.notified(), if !may_send => None,
+                () = sleep(left), if may_watch && !left.is_zero() => None,
                 _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
                 Some(filter) = chosen.recv() => {
                     view = filter.zip(self.shared.admission.node.as_ref()).map(|(filter, node)| {
@@ -487,11 +497,27 @@ impl Writer<'_> {
                     None
                 }
                 message = next_message(&mut view), if may_send => match message {
-                    Some(json) => Some(Message::Text(json)),
+                    Some(json) => Some(self.unconfirmed(Message::Text(json))),
                     None => return,
                 },
             };
+            next.extend(message);
+            // What goes with a state costs the way back nothing.
+            if may_send && !next.is_empty() {
+                if links.tick().now_or_never().is_some() {
+                    next.push(self.links());
+                }
+                if let Some(Some(list)) = lists.next().now_or_never() {
+                    next.push(text(&list));
+                }
+            }
         }
+    }
+
+    /// Notes that a frame is sent which the page does not confirm.
+    fn unconfirmed(&self, message: Message) -> Message {
+        self.link.lock().handle_frame(Instant::now());
+        message
     }
 
     fn hello(&self) -> Message {

@@ -19,7 +19,7 @@ test("nothing is driven before a state was shown", () => {
   assert.deepEqual(taken(), []);
 });
 
-test("one setpoint is under way at most, and the newest replaces what waits", () => {
+test("on a short link one setpoint is under way, and the newest replaces what waits", () => {
   const it = rig();
   it.flow.shown(12);
   assert.deepEqual(it.taken(), ["[12,0]"]);
@@ -106,4 +106,82 @@ test("a new connection begins without what the old one had under way", () => {
   assert.equal(it.flow.setpoint(push(0.1)), false, "it has shown no state yet");
   it.flow.confirmed();
   assert.deepEqual(it.taken(), []);
+});
+
+/** Drives every 100 ms for `time` ms, over a link that takes `frame` ms for each frame and `delay` ms for the
+ * rest of the round trip. Returns what was sent and the most setpoints under way, both in the last 5 s. */
+function drive(it, time, frame, delay) {
+  const arriving = (it.arriving ??= []);
+  let [most, sent, freeAt] = [0, 0, it.now];
+  for (const end = it.now + time; it.now < end; it.now += 10) {
+    while (arriving.length && arriving[0] <= it.now) {
+      arriving.shift();
+      it.flow.confirmed();
+    }
+    if (it.now % 100 === 0) it.flow.setpoint(push(0.5));
+    for (const _ of it.taken()) {
+      freeAt = Math.max(freeAt, it.now) + frame;
+      arriving.push(freeAt + delay);
+      if (it.now >= end - 5_000) sent += 1;
+    }
+    if (it.now >= end - 5_000) most = Math.max(most, arriving.length);
+  }
+  return { sent, most };
+}
+
+test("a link with a round trip of 0.6 s carries ten setpoints a second", () => {
+  for (const delay of [0, 300, 600, 700]) {
+    const it = rig();
+    it.flow.shown(1);
+    it.taken();
+    assert.equal(drive(it, 10_000, 0, delay).sent, 50, `${delay} ms`);
+  }
+});
+
+test("what the station has measured counts from the first setpoint", () => {
+  const it = rig();
+  it.flow.estimate(600);
+  it.flow.shown(1);
+  it.taken();
+  for (const expected of [1, 1, 1, 1, 1, 1, 1, 0]) {
+    it.flow.setpoint(push(0.5));
+    assert.equal(it.taken().length, expected);
+    it.now += 20;
+  }
+});
+
+test("a link that begins to queue has one setpoint under way", () => {
+  for (const delay of [0, 600]) {
+    const it = rig();
+    it.flow.shown(1);
+    it.taken();
+    drive(it, 5_000, 0, delay);
+    drive(it, 4_000, 400, delay);
+    assert.ok(drive(it, 5_000, 400, delay).most <= 2, `${delay} ms`);
+  }
+});
+
+test("after a queue, ten setpoints a second follow again", () => {
+  const it = rig();
+  it.flow.shown(1);
+  it.taken();
+  drive(it, 5_000, 0, 600);
+  drive(it, 3_000, 400, 600);
+  assert.equal(drive(it, 10_000, 0, 600).sent, 50);
+});
+
+test("one late confirmation is no queue", () => {
+  const it = rig();
+  it.flow.estimate(600);
+  it.flow.shown(1);
+  drive(it, 5_000, 0, 600);
+  it.taken();
+  for (let count = 0; count < 10; count++) it.flow.confirmed();
+  it.flow.setpoint(push(0.5));
+  it.now += 720;
+  it.taken();
+  it.flow.confirmed();
+  it.flow.setpoint(push(0.5));
+  it.flow.setpoint(push(0.6));
+  assert.equal(it.taken().length, 2);
 });

@@ -77,7 +77,7 @@ test("a key drives by the system's repeats, for as long as they come", () => {
   assert.equal(bench.owner, "Keys");
   assert.deepEqual(bench.last.vector, [1, 0]);
   const last = bench.now - (bench.now % 30);
-  bench.pass(last + 490 - bench.now);
+  bench.pass(last + 390 - bench.now);
   assert.equal(bench.owner, "Keys");
   bench.pass(10);
   assert.equal(bench.owner, null, "a key whose release got lost");
@@ -113,14 +113,14 @@ test("one repeat renews all held keys", () => {
   assert.deepEqual(bench.last.vector, [1, 1]);
 });
 
-test("if the repeating key is let go, the others drive 0.5 s at most", () => {
+test("if the repeating key is let go, the others drive 0.4 s at most", () => {
   const bench = new Bench();
   bench.press("KeyW");
   bench.pass(100);
   bench.press("KeyD");
   bench.pass(600, 30, () => bench.repeat("KeyD"));
   bench.lift("KeyD");
-  bench.pass(460);
+  bench.pass(360);
   assert.equal(bench.owner, "Keys");
   assert.deepEqual(bench.last.vector, [1, 0]);
   bench.pass(40);
@@ -128,13 +128,13 @@ test("if the repeating key is let go, the others drive 0.5 s at most", () => {
   assert.match(bench.input.takeNotice(), /press again/);
 });
 
-test("if the key that repeats is let go before its first repeat, the others drive 0.5 s at most", () => {
+test("if the key that repeats is let go before its first repeat, the others drive 0.4 s at most", () => {
   const bench = new Bench();
   bench.press("KeyW");
   bench.pass(100);
   bench.press("KeyD");
   bench.lift("KeyD");
-  bench.pass(600);
+  bench.pass(400);
   assert.equal(bench.owner, null);
 });
 
@@ -263,7 +263,7 @@ test("a gamepad drives while a shoulder button is held and its time stamp change
   bench.pass(5000, 20, () => bench.pad({ forward: 1 }));
   assert.deepEqual(bench.last, { source: "Gamepad", vector: [1, 0] });
   const timestamp = bench.now;
-  bench.pass(450, 20, () => bench.pad({ forward: 1, timestamp }));
+  bench.pass(350, 20, () => bench.pad({ forward: 1, timestamp }));
   assert.equal(bench.owner, "Gamepad");
   bench.pass(150, 20, () => bench.pad({ forward: 1, timestamp }));
   assert.equal(bench.owner, null);
