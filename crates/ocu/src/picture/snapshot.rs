@@ -142,7 +142,7 @@ impl Picture {
         map.or_else(|| self.maps.first()).cloned()
     }
 
-    fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
+    pub(super) fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
         let describe = |(id, name, how): (JausId, &str, Absence)| {
             let part = self.parts.get(&id).map(|it| (it.role, it.heard));
             let gone = || self.gone.get(id).map(|it| (it.role, it.heard));
