@@ -15,8 +15,8 @@ mod subscriptions;
 mod tests;
 mod topic;
 
-pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
 pub(super) use control::Controls;
+pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
 pub(super) use introduction::Introduction;
 pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
