@@ -26,7 +26,6 @@ use super::ports::{Command, GoalPose, Input, Output};
 use super::report::Report;
 use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
 use super::vehicle::{Role, Vehicle};
-use super::velocity::Velocity;
 use super::{Reports, Settings};
 
 /// The vehicle's side of the bridge.
