@@ -70,7 +70,7 @@ async fn a_page_gets_the_zones_once_and_the_points_that_the_range_sensor_sees() 
         range: 2.0,
     };
     sensor.publish(Some(&Scan::new((-45..=45).map(ahead))), SystemTime::now());
-    let builder = Component::builder(Kind::Vehicle, "Rover");
+    let builder = Component::builder(Kind::Vehicle, "Rover").management(Management::new());
     let _sensor = scene.attach(54, builder.offer(sensor.service()));
     let mut page = scene.page().await;
     page.select(101).await;
