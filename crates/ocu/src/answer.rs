@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::page_link::PageLinkQuality;
-use super::state::{Fleet, State, Tree};
+use super::state::{Fleet, Overlay, State, Tree};
 
 /// One frame to a page.
 #[derive(Debug, Serialize)]
@@ -32,6 +32,11 @@ pub(super) enum Said<'a> {
         page: PageLinkQuality,
         vehicle_round_trip_ms: Option<u64>,
         vehicle_loss_percent: Option<u8>,
+    },
+    /// What lies over the map of a vehicle; nothing of an unknown one.
+    Overlay {
+        id: Option<u64>,
+        overlay: Option<&'a Overlay>,
     },
     /// The session has handled a setpoint or the end of manual drive.
     Ok,

@@ -46,6 +46,12 @@ pub enum Said {
         #[serde(default)]
         filter: MessageFilter,
     },
+    /// Asks for what lies over the map of the vehicle.
+    Overlay {
+        /// Revision of the zones that the page has.
+        #[serde(default)]
+        zones: u32,
+    },
     /// A request for the vehicle.
     #[serde(untagged)]
     OperatorRequest(OperatorRequest),

@@ -118,7 +118,7 @@ export class Link extends EventTarget {
     this.#hurry();
   }
 
-  /** Sends a request; resolves to null when it is done, or to the reason why not. */
+  /** Sends a request; resolves to null when it is done, to what was asked for, or to the reason why not. */
   ask(request) {
     if (!this.open) return Promise.resolve("No connection: not sent.");
     const id = ++this.#ids;
@@ -237,6 +237,9 @@ export class Link extends EventTarget {
       case "fleet":
       case "tree":
         this.#emit(frame.type, frame);
+        break;
+      case "overlay":
+        this.#answer(number(frame.id), frame.overlay ?? null);
         break;
       case "done":
         this.#answer(number(frame.id), null);

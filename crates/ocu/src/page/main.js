@@ -21,7 +21,7 @@ import { showSystem, showTree } from "./tree.js";
 
 const account = new Account(() => link.restart(), () => link.send({ type: "active" }));
 const link = new Link(() => account.check());
-const map = new MapView((place) => choose(place));
+const map = new MapView((place) => choose(place), (request) => link.ask(request));
 const mission = new Mission(ask, map);
 const emergency = new Emergency(link, () => unbar());
 const drive = new Drive(link, () => emergency.stop());

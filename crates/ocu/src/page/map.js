@@ -18,7 +18,7 @@ export class MapView {
   #context = this.#canvas.getContext("2d");
   #raster = new Raster(null);
   #base = new BaseMap(() => this.#draw());
-  #overlay = new Overlay();
+  #overlay;
   #camera = { x: 0, y: 0, scale: 24 };
   /** What the first view shows: `raster`, `vehicle`, or nothing yet. */
   #placed = "";
@@ -39,9 +39,10 @@ export class MapView {
   #pick;
   #colours = {};
 
-  /** Calls `pick` with {x, y} in metres when the operator taps a place. */
-  constructor(pick) {
+  /** Calls `pick` with {x, y} in metres when the operator taps a place. Asks the station with `ask`. */
+  constructor(pick, ask) {
     this.#pick = pick;
+    this.#overlay = new Overlay(ask);
     new ResizeObserver(() => this.#resize()).observe(this.#canvas);
     this.#listen();
     this.recolour();

@@ -18,13 +18,12 @@ pub(crate) struct File {
 /// server, nothing else. Inline styles and event handlers are blocked as well, so a name from the
 /// network can never become code.
 pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
-    img-src 'self'; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; \
+    img-src 'self' data:; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; \
     frame-ancestors 'none'";
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-const IMAGE: &str = "image/svg+xml";
 
 macro_rules! files {
     ($($path:literal $content_type:ident $file:literal,)*) => {
@@ -38,7 +37,6 @@ pub(crate) const FILES: &[File] = files! {
     "/style.css" CSS "style.css",
     "/sections.css" CSS "sections.css",
     "/alerts.css" CSS "alerts.css",
-    "/icon.svg" IMAGE "icon.svg",
     "/start.js" SCRIPT "start.js",
     "/main.js" SCRIPT "main.js",
     "/account.js" SCRIPT "account.js",

@@ -25,7 +25,9 @@ export class Overlay {
   /** Age of the scan by the latest state; null without one. */
   #age = null;
 
-  constructor(pull = new Pull(PERIOD)) {
+  /** Asks the station with `ask`, over the connection that is there: a request by HTTP takes 0.5 kB of the
+   * way on which stops travel. */
+  constructor(ask, pull = new Pull(PERIOD, (request) => asked(ask, request))) {
     this.#pull = pull;
   }
 
@@ -38,8 +40,8 @@ export class Overlay {
     if (vehicle === null || !live || !revision) return;
     const isNew = revision.zones !== this.#zonesRevision || revision.scan !== this.#scanRevision;
     if (!isNew) return;
-    const path = `/overlay/${vehicle}?zones=${this.#zonesRevision}`;
-    this.#pull.get(path, token, (overlay) => {
+    const request = { type: "overlay", zones: this.#zonesRevision };
+    this.#pull.get(request, token, (overlay) => {
       this.#take(overlay);
       changed();
     });
@@ -88,6 +90,11 @@ export class Overlay {
     this.#obstacles = points(overlay.obstacles, MOST_POINTS);
     this.#cell = Math.min(Math.max(number(overlay.cell_m) ?? 0.25, 0.01), 10);
   }
+}
+
+async function asked(ask, request) {
+  const content = await ask(request);
+  return { ok: typeof content !== "string", json: async () => content };
 }
 
 function problem({ problem: why, omitted_zones: omitted }) {

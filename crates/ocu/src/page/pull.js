@@ -22,10 +22,10 @@ export class Pull {
   }
 
   /** Fetches JSON if it is time to, and gives it to `take`; true if a request was sent. */
-  get(path, token, take) {
+  get(request, token, take) {
     if (this.#busy || this.#now() < this.#notBefore) return false;
     this.#busy = true;
-    this.#load(path, token, take);
+    this.#load(request, token, take);
     return true;
   }
 
@@ -35,14 +35,14 @@ export class Pull {
     this.#notBefore = 0;
   }
 
-  async #load(path, token, take) {
+  async #load(request, token, take) {
     const [begun, era] = [this.#now(), this.#era];
     const headers = token ? { Authorization: `Bearer ${token}` } : {};
     let pause = RETRY;
     try {
-      const answer = await this.#fetch(path, { headers, cache: "no-store" });
+      const answer = await this.#fetch(request, { headers, cache: "no-store" });
       const content = answer.ok ? await answer.json() : null;
-      pause = answer.ok ? Math.max(this.#period, (this.#now() - begun) * SHARE) : RETRY;
+      pause = Math.max(answer.ok ? this.#period : RETRY, (this.#now() - begun) * SHARE);
       if (content !== null && typeof content === "object" && era === this.#era) take(content);
     } catch {
       // The state says that there is no connection. The next attempt follows.

@@ -4,8 +4,8 @@
 
 const FIRST_PAUSE = 250;
 const LONGEST_PAUSE = 4_000;
-/** The station says something every 3 s, which a slow link delays. A connection that is silent for so long is given up. */
-const DEAD = 10_000;
+/** The station says something every 10 s, which a slow link delays. A connection that is silent for so long is given up. */
+const DEAD = 25_000;
 /** Pauses between the repetitions of a stop in milliseconds; the last one goes on. */
 const REPEATS = [50, 100, 200, 500];
 /** With one packet in three lost, two connections bring a stop through in time. */

@@ -1,12 +1,12 @@
-//! What pages fetch when they show it: the overlay of the map, and the log of events. The snapshot
-//! states revisions, so that a page fetches only what is new to it, and one thing at a time: a slow
-//! link is not filled with what waits.
+//! What pages fetch when they show it: the log of events. The snapshot states its latest event, so that a
+//! page fetches only what is new to it, and one thing at a time: a slow link is not filled with what
+//! waits.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{ConnectInfo, Path, Query, State};
+use axum::extract::{ConnectInfo, Query, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -15,46 +15,12 @@ use tokio::sync::oneshot;
 use super::Shared;
 use crate::orders::Order;
 
-/// What the page has of the overlay.
-#[derive(Deserialize)]
-pub(super) struct Known {
-    /// Revision of its zones.
-    #[serde(default)]
-    zones: u32,
-}
-
 /// What the page has of the log.
 #[derive(Deserialize)]
 pub(super) struct After {
     /// Number of its latest event.
     #[serde(default)]
     after: u64,
-}
-
-/// The overlay of a vehicle's map.
-pub(super) async fn serve_overlay(
-    State(shared): State<Arc<Shared>>,
-    ConnectInfo(address): ConnectInfo<SocketAddr>,
-    Path(vehicle): Path<u16>,
-    Query(Known { zones }): Query<Known>,
-    headers: HeaderMap,
-) -> Response {
-    if let Err(refusal) = shared.check_reader(&headers, address).await {
-        return refusal.into_response();
-    }
-    let (reply, overlay) = oneshot::channel();
-    let order = Order::Overlay {
-        vehicle,
-        zones,
-        reply,
-    };
-    // On failure the reply end is dropped as well, which is handled below.
-    let _ = shared.access.orders.send(order).await;
-    match overlay.await {
-        Ok(Some(overlay)) => Json(overlay).into_response(),
-        Ok(None) => (StatusCode::NOT_FOUND, "unknown vehicle\n").into_response(),
-        Err(_) => ENDED.into_response(),
-    }
 }
 
 /// The events after the page's latest one.

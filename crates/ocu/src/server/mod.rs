@@ -174,7 +174,6 @@ impl Server {
             .route("/ws", get(serve_page))
             .route("/stop", get(serve_stops))
             .route("/map/{vehicle}/{map}", get(serve_map))
-            .route("/overlay/{vehicle}", get(looks::serve_overlay))
             .route("/events", get(looks::serve_events))
             .route("/base-map", get(base_map::describe))
             .route("/base-map/{zoom}/{x}/{y}", get(base_map::serve))
@@ -208,7 +207,13 @@ async fn admit(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
         return (refusal.status(), format!("{refusal}\n")).into_response();
     }
     let mut response = next.run(request).await;
+    let is_upgraded = response.status() == StatusCode::SWITCHING_PROTOCOLS;
     let headers = response.headers_mut();
+    if !is_upgraded {
+        // Closing idle connections later costs packets of the link by which a vehicle may be driven
+        // then, and a stop would wait behind them.
+        headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
+    }
     for (name, value) in HEADERS {
         // A handler may forbid caching altogether.
         headers

@@ -9,7 +9,7 @@ use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::Deserialize;
-use tokio::sync::{Notify, mpsc, watch};
+use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
 use super::Shared;
@@ -234,6 +234,7 @@ impl Reader<'_> {
             Said::Token { token } => return self.show(frame.id, &token).await,
             Said::Active => {}
             Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
+            Said::Overlay { zones } => self.overlay(frame.id, frame.vehicle, zones),
             Said::OperatorRequest(OperatorRequest::Drive {
                 forward,
                 turn,
@@ -280,6 +281,31 @@ impl Reader<'_> {
         // On error the writer has ended, and the connection with it.
         let _ = self.views.send(chosen).await;
         self.say(id.map(|id| Answer::Done { id }).as_ref());
+    }
+
+    /// Answers what lies over the map, when the session has it: nothing that follows waits for that.
+    fn overlay(&mut self, id: Option<u64>, vehicle: Option<u16>, zones: u32) {
+        if !self.visitor.may(UserRole::Observe) {
+            return self.refuse(id, "viewing requires the token too");
+        }
+        let Some(vehicle) = vehicle else {
+            return self.refuse(id, "name a vehicle");
+        };
+        let (orders, answers) = (self.shared.access.orders.clone(), self.answers.clone());
+        tokio::spawn(async move {
+            let (reply, overlay) = oneshot::channel();
+            let order = Order::Overlay {
+                vehicle,
+                zones,
+                reply,
+            };
+            // On error the session has ended, and the reply end is dropped as well.
+            let _ = orders.send(order).await;
+            if let Ok(overlay) = overlay.await {
+                let overlay = overlay.as_ref();
+                say(&answers, &Answer::Overlay { id, overlay });
+            }
+        });
     }
 
     /// Judges the age of a setpoint, and passes it on. The session confirms it, so that the page

@@ -23,8 +23,8 @@ use crate::request::OperatorRequest;
 use crate::users::UserRole;
 
 /// Interval of empty frames, by which the page knows that the connection works. TCP acknowledges each
-/// with 52 octets, which a slow way back has to carry.
-const PULSE: Duration = Duration::from_secs(3);
+/// with 52 octets, and repeats it several times on a way back that has become slow.
+const PULSE: Duration = Duration::from_secs(10);
 /// Interval of pings. Their answers keep the connection from being idle.
 const PING: Duration = Duration::from_secs(10);
 /// A page that accepts no data for this time is disconnected.

@@ -7,6 +7,7 @@ use jaus::component::State;
 use jaus_ocu::{Station, Token};
 use jaus_test_kit::waiting::within_limit;
 use serde_json::json;
+use tokio::time::timeout;
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -122,15 +123,14 @@ async fn where_looking_needs_the_token_stopping_needs_it_too() {
 }
 
 #[tokio::test]
-async fn a_connection_for_stops_says_something_every_second() {
+async fn a_connection_for_stops_says_something_at_once_and_again_within_10_s() {
     let scene = Scene::new().await;
     let mut socket = stops(&scene).await;
-    let start = Instant::now();
+    // A frame and a ping come at once.
     for _ in 0..3 {
-        match within_limit(socket.next()).await {
-            Some(Ok(Message::Text(_) | Message::Ping(_))) => {}
+        match timeout(Duration::from_secs(12), socket.next()).await {
+            Ok(Some(Ok(Message::Text(_) | Message::Ping(_)))) => {}
             other => panic!("{other:?}"),
         }
     }
-    assert!(start.elapsed() < Duration::from_secs(3));
 }

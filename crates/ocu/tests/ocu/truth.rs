@@ -14,12 +14,19 @@ use jaus_vehicle::sensing::{RangerConfig, Ray, Scan};
 use serde_json::{Value, json};
 use std::time::{Duration, SystemTime};
 
-use crate::scene::Scene;
+use crate::scene::{Page, Scene};
 
 async fn fetched(scene: &Scene, path: &str) -> Value {
     let (head, body) = scene.get(path, "").await;
     assert!(head.starts_with("http/1.1 200"), "{head}");
     serde_json::from_slice(&body).unwrap()
+}
+
+/// What lies over the map of a vehicle, for a page that has the zones of a revision.
+async fn overlay_of(page: &mut Page, vehicle: u16, zones: u64) -> Value {
+    page.say(&json!({"type": "overlay", "vehicle": vehicle, "zones": zones}))
+        .await;
+    page.said("overlay").await["overlay"].take()
 }
 
 /// A store with an operating zone of 40 m around the origin.
@@ -72,7 +79,7 @@ async fn a_page_gets_the_zones_once_and_the_points_that_the_range_sensor_sees() 
         .until(|it| revision(it, "zones") > Some(0) && revision(it, "scan") > Some(0))
         .await;
     assert!(state["vehicle"]["overlay"]["scan_age_ms"].as_u64() < Some(5000));
-    let overlay = fetched(&scene, "/overlay/101?zones=0").await;
+    let overlay = overlay_of(&mut page, 101, 0).await;
     assert_eq!(overlay["zones"][0]["number"], 1);
     assert_eq!(overlay["zones"][0]["points"][2], json!([20.0, 20.0]));
     let points = overlay["scan"].as_array().unwrap();
@@ -85,10 +92,9 @@ async fn a_page_gets_the_zones_once_and_the_points_that_the_range_sensor_sees() 
     assert!(!overlay["obstacles"].as_array().unwrap().is_empty());
 
     let known = overlay["zones_revision"].as_u64().unwrap();
-    let again = fetched(&scene, &format!("/overlay/101?zones={known}")).await;
+    let again = overlay_of(&mut page, 101, known).await;
     assert_eq!(again["zones"], Value::Null, "the page has them");
-    let (head, _) = scene.get("/overlay/999", "").await;
-    assert!(head.starts_with("http/1.1 404"), "{head}");
+    assert_eq!(overlay_of(&mut page, 999, 0).await, Value::Null);
 }
 
 #[tokio::test]
@@ -99,10 +105,11 @@ async fn the_overlay_and_the_log_need_the_token_where_the_map_needs_it() {
         ..Station::default()
     };
     let scene = Scene::with(station, 0).await;
-    for path in ["/overlay/101", "/events"] {
-        let (head, _) = scene.get(path, "").await;
-        assert!(head.starts_with("http/1.1 401"), "{path}: {head}");
-    }
+    let (head, _) = scene.get("/events", "").await;
+    assert!(head.starts_with("http/1.1 401"), "{head}");
+    let mut page = scene.page().await;
+    let refused = page.ask(json!({"type": "overlay", "vehicle": 101})).await;
+    assert!(refused.unwrap_err().contains("token"));
     let token = "Authorization: Bearer correct-horse-battery\r\n";
     let (head, _) = scene.get("/events", token).await;
     assert!(head.starts_with("http/1.1 200"), "{head}");

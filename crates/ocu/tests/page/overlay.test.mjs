@@ -26,12 +26,12 @@ const SQUARE = [[0, 0], [0, 9], [9, 9], [9, 0]];
 
 test("nothing is fetched before something is reported, and zones only once", async () => {
   const bench = network({ zones_revision: 1, zones: [{ number: 1, points: SQUARE }], scan_revision: 0, scan: [], obstacles: [] });
-  const overlay = new Overlay(bench.pull);
+  const overlay = new Overlay(null, bench.pull);
   overlay.update(state(0, 0, null), true, "secret", () => {});
   assert.equal(bench.asked.length, 0);
   overlay.update(state(1, 0, null), true, "secret", () => {});
   await settle();
-  assert.equal(bench.asked[0].path, "/overlay/101?zones=0");
+  assert.deepEqual(bench.asked[0].path, { type: "overlay", zones: 0 });
   assert.equal(bench.asked[0].options.headers.Authorization, "Bearer secret");
   assert.equal(overlay.content.zones[0].points.length, 4);
   bench.now += 10_000;
@@ -40,7 +40,7 @@ test("nothing is fetched before something is reported, and zones only once", asy
   bench.content = { zones_revision: 1, zones: null, scan_revision: 5, scan: [[1, 2]], obstacles: [] };
   overlay.update(state(1, 5), true, "", () => {});
   await settle();
-  assert.equal(bench.asked[1].path, "/overlay/101?zones=1");
+  assert.deepEqual(bench.asked[1].path, { type: "overlay", zones: 1 });
   assert.equal(overlay.content.zones.length, 1, "those that the page has");
   assert.deepEqual(overlay.content.scan, [{ x: 1, y: 2 }]);
 });
@@ -48,7 +48,7 @@ test("nothing is fetched before something is reported, and zones only once", asy
 test("scans are fetched at most twice a second, and less often on a slow link", async () => {
   for (const [takes, most] of [[0, 21], [1_000, 3]]) {
     const bench = network({ zones_revision: 0, scan_revision: 0, scan: [], obstacles: [] }, takes);
-    const overlay = new Overlay(bench.pull);
+    const overlay = new Overlay(null, bench.pull);
     for (let revision = 1; bench.now < 10_000; revision++) {
       overlay.update(state(0, revision), true, "", () => {});
       await settle();
@@ -60,7 +60,7 @@ test("scans are fetched at most twice a second, and less often on a slow link", 
 
 test("a scan that is old is marked, and one that is much older not drawn", async () => {
   const bench = network({ zones_revision: 0, scan_revision: 1, scan: [[1, 2]], obstacles: [[3, 4]] });
-  const overlay = new Overlay(bench.pull);
+  const overlay = new Overlay(null, bench.pull);
   overlay.update(state(0, 1), true, "", () => {});
   await settle();
   assert.equal(overlay.content.old, false);
@@ -73,7 +73,7 @@ test("a scan that is old is marked, and one that is much older not drawn", async
 
 test("an answer about the vehicle before is dropped", async () => {
   const bench = network({ zones_revision: 1, zones: [{ number: 1, points: SQUARE }], scan_revision: 0 });
-  const overlay = new Overlay(bench.pull);
+  const overlay = new Overlay(null, bench.pull);
   overlay.update(state(1, 0), true, "", () => {});
   overlay.update(state(0, 0, null, 102), true, "", () => {});
   await settle();
@@ -85,7 +85,7 @@ test("hostile answers are bounded and drawn without errors", async () => {
   const zones = Array.from({ length: 5_000 }, () => ({ number: "x", points: far }));
   for (const content of [{ zones, scan: far, obstacles: far, cell_m: -1 }, { zones: [null, { points: [[NaN, 1], "x"] }], scan: "x" }, []]) {
     const bench = network({ ...content, zones_revision: 1, scan_revision: 1 });
-    const overlay = new Overlay(bench.pull);
+    const overlay = new Overlay(null, bench.pull);
     overlay.update(state(1, 1), true, "", () => {});
     await settle();
     const { content: shown } = overlay;

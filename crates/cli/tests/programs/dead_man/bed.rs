@@ -7,6 +7,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
 use jaus_test_kit::hosts::{add_host, ip, on_host};
@@ -66,6 +67,8 @@ impl Bed {
         set_up(&names, system.operator())?;
         let link = Relay::start(&names[1], ["browser", "station"])?;
         system.start_all();
+        // Chromium drops its requests when the interfaces get their IPv6 addresses.
+        sleep(Duration::from_secs(3));
         Ok(Self {
             link,
             motors,

@@ -44,8 +44,10 @@ fn released_or_lost_keys_and_touches_stop_the_motors_in_time() {
 fn an_emergency_stop_overtakes_what_is_held_on_a_slow_link() {
     on_a_bed(|bed| {
         let mut measurement = Measurement::new(bed);
-        let held = [2, 5, 10].map(Duration::from_secs);
-        let cells = held.map(|it| measurement.stop(Source::Keys, Stop::Escape, Link::SLOW_UP, it));
+        let held = [2, 5, 12].map(Duration::from_secs);
+        let mut stop = |link, held| measurement.stop(Source::Keys, Stop::Escape, link, held);
+        let mut cells = Vec::from(held.map(|it| stop(Link::SLOW_UP, it)));
+        cells.extend(held.map(|it| stop(Link::SLOW, it)));
         all_are_met(&cells);
     });
 }

@@ -49,9 +49,11 @@ fn sets_a_zone(system: &System, page: &mut Browser) {
     assert!(sent.status.success(), "{sent:?}");
     // The station has the zone before the vehicle can reach its edge.
     page.value(
-        "(globalThis.zones = 0), setInterval(async () => { \
-         const overlay = await (await fetch('/overlay/101')).json(); \
-         globalThis.zones = overlay.zones.length; }, 200), 0",
+        "(globalThis.zones = 0), (globalThis.asking = new WebSocket(`ws://${location.host}/ws`)), \
+         (asking.onmessage = ({ data }) => { \
+         globalThis.zones = JSON.parse(data).overlay?.zones.length ?? globalThis.zones; }), \
+         setInterval(() => asking.readyState === 1 && \
+         asking.send('{\"type\":\"overlay\",\"vehicle\":101}'), 200), 0",
     );
     page.wait("globalThis.zones === 1");
 }
