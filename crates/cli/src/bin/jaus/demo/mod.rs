@@ -250,6 +250,8 @@ impl Demo {
 
     fn planner(&self) -> Planner {
         let mut planner = Planner::default().turning_radius(self.turning_radius());
+        // Everything runs on one computer, which may be busy: a late sample does not end the demo.
+        planner.mission.retries = 5;
         if self.ackermann {
             planner.vehicle.width = CAR_WIDTH;
         }
