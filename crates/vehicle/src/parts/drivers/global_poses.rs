@@ -90,6 +90,7 @@ mod tests {
     use crate::motion::{Goal, Limits, Pilot, Pose, Waypoint};
     use crate::parts::drivers::remote_platform::Plan;
     use crate::parts::drivers::{FaultMonitor, RemotePlatformSettings};
+    use jaus::messages::core;
     use jaus::messages::mobility::report_global_pose::TimeStamp;
 
     /// A driver on its way north, with a sensor that reports 25 times a second.
@@ -148,7 +149,11 @@ mod tests {
                 self.remote_platform
                     .handle_velocity(self.now, None, velocity);
                 if let Some(report) = fault(self.report()) {
-                    self.poses.handle_report(self.now, None, &report);
+                    let stamp = report
+                        .time_stamp
+                        .map(|it| core::report_time::TimeStamp(it.0));
+                    let stamp = stamp.and_then(|it| SampleStamp::of_report(it, None));
+                    self.poses.handle_report(self.now, stamp, &report);
                 }
                 self.vehicle.handle_time(self.now);
             }
