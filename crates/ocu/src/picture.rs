@@ -414,9 +414,14 @@ impl Picture {
         if self.in_emergency().next().is_some() {
             return None;
         }
+        // While an operator has the primitive driver, the others only say that they have not.
+        let primitive = self.find(Role::PrimitiveDriver);
+        let primitive = primitive.and_then(|id| self.parts.get(&id)?.controller());
+        let is_by_hand = primitive.is_some_and(|id| id.subsystem() != self.vehicle);
         let holding = self
             .parts
             .iter()
+            .filter(|(_, part)| !is_by_hand || part.role == Role::PrimitiveDriver)
             .filter_map(|(id, part)| Some((part.role, id, part.hold_reason(now)?)));
         let (role, id, reason) = holding.min_by_key(|(role, ..)| *role)?;
         Some(state::HoldReason {

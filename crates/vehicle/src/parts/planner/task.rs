@@ -409,7 +409,10 @@ impl<'a> PlannerTask<'a> {
             Link::Vector => self.peers[Link::Path as usize],
             Link::Primitive => self.peers[Link::Vector as usize],
         };
-        if before != Some(client) {
+        // The driver before may not have been found yet, but its control of this one has.
+        let may_be_before =
+            before.is_none() && client.subsystem() == self.component.id().subsystem();
+        if before != Some(client) && !may_be_before {
             let reason = format!(
                 "{client} has taken control of the {link}{}",
                 self.named(link)
