@@ -8,6 +8,8 @@ import { Input } from "./input.js";
 import { InputEvents } from "./input_events.js";
 
 const PERIOD = 100;
+/** Within this time, in milliseconds, two ends are those of one drive. */
+const ONCE = 2_000;
 /** Distance of the knob's middle from the stick's rim, in CSS pixels. */
 const RIM = 36;
 
@@ -23,6 +25,8 @@ export class Drive {
   /** Why the station ended driving although nothing was let go. */
   #halt = "";
   #end = new DriveEnd();
+  /** When the end of a drive was told last. */
+  #toldAt = -Infinity;
   /** Why a driver of the vehicle holds it; empty if none does. */
   #holdReason = "";
 
@@ -44,7 +48,7 @@ export class Drive {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
     const ended = this.#end.update(state);
-    if (ended) toast("bad", `Driving ended: ${ended}`);
+    if (ended) this.#tellEnd("bad", `Driving ended: ${ended}`);
     this.#halt = plain(state?.drive?.reason, 200);
     this.#holdReason = plain(state?.vehicle?.held?.reason, 200);
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
@@ -69,6 +73,13 @@ export class Drive {
     return this.#isShown && this.#events.keyDown(event);
   }
 
+  /** Page and station may both notice what ended a drive: the first one says so. */
+  #tellEnd(level, text) {
+    const now = performance.now();
+    if (now - this.#toldAt > ONCE) toast(level, text);
+    this.#toldAt = now;
+  }
+
   #hinder() {
     const obstacle = this.#events.isCovered ? "Close the dialog first." : this.#isShown ? this.#obstacle : "Open the Drive view to drive.";
     this.#input.hinder(obstacle, performance.now());
@@ -86,7 +97,8 @@ export class Drive {
       this.#render([0, 0], null);
     }
     const notice = this.#input.takeNotice();
-    if (notice) toast("warn", notice);
+    if (notice.startsWith("Driving ended")) this.#tellEnd("warn", notice);
+    else if (notice) toast("warn", notice);
   }
 
   #tick() {
