@@ -25,6 +25,7 @@ use self::operator::{Event, Source, Stop};
 use crate::e2e::{browser, system};
 
 #[test]
+#[ignore = "measures times: alone on the machine, by .ci/run"]
 fn released_or_lost_keys_and_touches_stop_the_motors_in_time() {
     on_a_bed(|bed| {
         let mut measurement = Measurement::new(bed);
@@ -41,6 +42,7 @@ fn released_or_lost_keys_and_touches_stop_the_motors_in_time() {
 }
 
 #[test]
+#[ignore = "measures times: alone on the machine, by .ci/dead-man"]
 fn an_emergency_stop_overtakes_what_is_held_on_a_slow_link() {
     on_a_bed(|bed| {
         let mut measurement = Measurement::new(bed);
