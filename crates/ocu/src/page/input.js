@@ -1,4 +1,4 @@
-// Who drives: one source at a time, and only while it proves that somebody holds it. Without document and
+// Who drives: one source at a time, and only while it renews itself. Without document and
 // without clock: times are arguments, in milliseconds of `performance.now()`; `time` is when something
 // happened (`event.timeStamp`), `now` is when the page learned of it.
 

@@ -1,7 +1,7 @@
 // The sources of manual drive: keys, mouse or touch, gamepad. Each is a state machine without document
 // and without clock: times are arguments, in milliseconds of `performance.now()` and `event.timeStamp`.
 //
-// A source drives only while it proves that somebody holds it. After `end` nothing that was held counts:
+// A source drives only while it renews itself. After `end` nothing that was held counts:
 // it must come to rest and be taken up anew.
 
 /** What each key asks for: ahead and right. */

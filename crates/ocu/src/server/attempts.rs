@@ -1,5 +1,5 @@
 //! Limits on failed logins. Wrong guesses delay the guesser: a device from which the user has logged
-//! in before, or else an address. They make nobody else wait, but for [`SLOWED`].
+//! in before, or else an address. Other devices wait no longer than [`SLOWED`].
 
 use std::time::{Duration, Instant};
 

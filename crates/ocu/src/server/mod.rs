@@ -372,7 +372,7 @@ impl Shared {
         }
         match token_of_handshake(headers) {
             Some(shown) if self.admits(shown).await => self.trust(visitor, places),
-            // The page is told of its wrong token, and may ask for another.
+            // The page connects, reports the wrong token and queries for another.
             _ => {
                 visitor.settle(Some(self.place(strangers, visitor)?));
                 Ok(())

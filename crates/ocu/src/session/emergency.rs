@@ -1,5 +1,5 @@
-//! Emergencies of one vehicle and of all. Every page may set one at any time, whoever has the
-//! vehicle.
+//! Emergencies of one vehicle and of all. Every page may set one at any time, also if another page
+//! owns the vehicle.
 
 use std::time::Instant;
 

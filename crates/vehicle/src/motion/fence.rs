@@ -139,7 +139,7 @@ impl Fence {
         }
     }
 
-    /// Lets the pose count again after a jump, because somebody has taken or given up control since.
+    /// Accepts the pose again after a jump, because control was taken or released since.
     pub fn confirm_pose(&self) {
         if let Some(located) = &mut self.lock().located {
             located.doubt = None;

@@ -138,7 +138,7 @@ pub(in crate::parts) struct ChainGuard {
 }
 
 impl ChainGuard {
-    /// Lets messages pass, whoever sends them, if they are harmless.
+    /// Accepts harmless messages from any sender.
     pub(in crate::parts) fn unless(
         mut self,
         is_harmless: impl Fn(&Received) -> bool + Send + 'static,
