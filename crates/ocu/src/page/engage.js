@@ -56,19 +56,19 @@ export class Engage {
 
   /** Goes on by hand once the mission is over. */
   #stopMission(operable, obstacle) {
-    if (!operable || obstacle) return this.#end(obstacle);
-    if (!this.#mission.drives) {
+    if (this.#mustEnd(operable, obstacle)) return;
+    if (operable && !this.#mission.drives) {
       this.#isTakingOver = false;
       this.#begin({ type: "control", on: true });
-    } else if (performance.now() - this.#asked > GRACE) {
+    } else if (this.#isLate) {
       this.#end("The mission did not stop");
     }
   }
 
   /** The next step, once the one before has shown its effect. */
   #go(isOurs, held, mode, operable, obstacle) {
-    if (!operable || obstacle) return this.#end(obstacle);
-    if (!isOurs) return performance.now() - this.#asked > GRACE ? this.#end("Control was not granted") : undefined;
+    if (this.#mustEnd(operable, obstacle) || !operable) return;
+    if (!isOurs) return this.#isLate ? this.#end("Control was not granted") : undefined;
     if (!held) return;
     if (mode === "ready") {
       this.#end("");
@@ -77,6 +77,17 @@ export class Engage {
       this.#resumed = true;
       this.#request({ type: "resume" });
     }
+  }
+
+  get #isLate() {
+    return performance.now() - this.#asked > GRACE;
+  }
+
+  /** Ends for an obstacle, or for a connection that stays lost: a late packet does not take the operator's word back. */
+  #mustEnd(operable, obstacle) {
+    const isLost = !operable && this.#isLate;
+    if (obstacle || isLost) this.#end(obstacle || "The connection was lost: press again");
+    return Boolean(obstacle || isLost);
   }
 
   async #request(request) {

@@ -175,7 +175,10 @@ pub(crate) struct Display {
 impl Display {
     fn start(host: &str) -> Result<Self, String> {
         let mut command = on_host(host, "Xvfb");
+        // Left to itself, it would take over the socket of another measurement: it sees only those of its own host.
+        let own = format!(":{}", 100 + std::process::id() % 50_000);
         command.args([
+            &own,
             "-displayfd",
             "1",
             "-screen",

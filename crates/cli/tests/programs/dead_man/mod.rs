@@ -7,6 +7,8 @@
 
 mod bed;
 mod cell;
+mod link;
+mod measurement;
 mod motor;
 mod operator;
 mod relay;
@@ -20,7 +22,9 @@ use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::hosts::on_hosts;
 
 use self::bed::Bed;
-use self::cell::{Cell, Link, Measurement};
+use self::cell::Cell;
+use self::link::Link;
+use self::measurement::Measurement;
 use self::operator::{Event, Source, Stop};
 use crate::e2e::{browser, system};
 

@@ -89,6 +89,21 @@ impl Motors {
         log.len() > last && log[last..].iter().all(Sample::drives)
     }
 
+    /// Whether the last command before a time drove.
+    pub(crate) fn drove_at(&self, time: Instant) -> bool {
+        let log = self.log.lock().unwrap();
+        let before = log.partition_point(|it| it.at < time);
+        before > 0 && log[before - 1].drives()
+    }
+
+    /// Whether no command has driven for some time.
+    pub(crate) fn are_still(&self, time: Duration) -> bool {
+        let since = Instant::now() - time;
+        let log = self.log.lock().unwrap();
+        let before = log.partition_point(|it| it.at < since);
+        !log[before.saturating_sub(1)..].iter().any(Sample::drives)
+    }
+
     /// The share of commands between two times that drove, 0 to 1.
     pub(crate) fn share_driven(&self, from: Instant, to: Instant) -> f64 {
         let log = self.log.lock().unwrap();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use super::bed::{Bed, CLEAR, within};
+use super::bed::{Bed, within};
 use crate::e2e::browser::Browser;
 use crate::e2e::{FAR, FAR_BACK, SLOW, approve, plan};
 
@@ -56,15 +56,19 @@ pub(crate) enum Event {
     Resize,
     /// The screen is turned.
     Rotation,
-    ModifierKey,
+    AltKey,
+    SuperKey,
+    /// A dialog of the page opens.
     Dialog,
+    /// A dialog of the browser opens, and nothing runs on the page.
+    Alert,
     LeftView,
     /// The operator touches the stick, or a key if it is the stick that is held.
     OtherSource,
 }
 
 impl Event {
-    pub(crate) const ALL: [Self; 15] = [
+    pub(crate) const ALL: [Self; 17] = [
         Self::Release,
         Self::Lost,
         Self::ContextMenu,
@@ -76,8 +80,10 @@ impl Event {
         Self::KilledBrowser,
         Self::Resize,
         Self::Rotation,
-        Self::ModifierKey,
+        Self::AltKey,
+        Self::SuperKey,
         Self::Dialog,
+        Self::Alert,
         Self::LeftView,
         Self::OtherSource,
     ];
@@ -95,8 +101,10 @@ impl Event {
             Self::KilledBrowser => "browser killed",
             Self::Resize => "window resized",
             Self::Rotation => "screen turned",
-            Self::ModifierKey => "modifier key",
-            Self::Dialog => "dialog",
+            Self::AltKey => "Alt pressed",
+            Self::SuperKey => "Super pressed",
+            Self::Dialog => "dialog of the page",
+            Self::Alert => "dialog of the browser",
             Self::LeftView => "another view",
             Self::OtherSource => "another source",
         }
@@ -124,6 +132,7 @@ const IS_READY: &str = "document.querySelector('#by-hand').hidden && document.bo
     && document.querySelector('#state-word').textContent === 'Ready'";
 const IS_IN_EMERGENCY: &str = "document.body.dataset.emergency === 'stopped'";
 const IS_NO_EMERGENCY: &str = "document.body.dataset.emergency === 'ready'";
+const OPEN_DIALOG: &str = "document.querySelector('#clear-sheet').hidden = false";
 const LINE: &str = "#drive-line";
 /// A position of the map that has no control, as fractions of its size.
 const OF_THE_MAP: &str = "(() => { const b = document.querySelector('#map').getBoundingClientRect(); \
@@ -159,8 +168,20 @@ const BEFORE_LOAD: &str = r"(() => {
 pub(crate) struct Operator<'a> {
     bed: &'a Bed,
     browser: Browser,
-    is_killed: bool,
-    is_open: bool,
+    page: Page,
+}
+
+/// What has become of the operator's page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Page {
+    /// It is as it was opened.
+    Intact,
+    /// It is still there; something has happened to it.
+    Changed,
+    /// It is closed, or a dialog keeps it from running.
+    Closed,
+    /// Its browser is gone.
+    Killed,
 }
 
 impl<'a> Operator<'a> {
@@ -168,14 +189,18 @@ impl<'a> Operator<'a> {
         Self {
             bed,
             browser: bed.browser(),
-            is_killed: false,
-            is_open: false,
+            page: Page::Closed,
         }
     }
 
-    /// Opens the page in a new tab or browser, and makes the vehicle ready to be driven by hand. An emergency is cleared.
+    /// Whether the page is as it was opened.
+    pub(crate) fn is_intact(&self) -> bool {
+        self.page == Page::Intact
+    }
+
+    /// Makes the vehicle ready to be driven by hand. An emergency is cleared.
     pub(crate) fn engage(&mut self) {
-        self.open();
+        self.browser.wait(IS_LIVE);
         self.clear_emergency();
         // The vehicle may still be ready from the time before.
         let begins = format!("{IS_READY} || !document.querySelector('{DRIVE_BY_HAND}').hidden");
@@ -188,15 +213,15 @@ impl<'a> Operator<'a> {
         self.bed.display.input("mousemove 300 400");
     }
 
-    /// Opens the page.
+    /// Opens the page in a new tab or browser.
     pub(crate) fn open(&mut self) {
-        if std::mem::take(&mut self.is_killed) {
+        if self.page == Page::Killed {
             self.browser = self.bed.browser();
         } else {
             self.browser.close_tabs();
             self.browser.open_tab();
         }
-        self.is_open = true;
+        self.page = Page::Intact;
         let script = json!({ "source": BEFORE_LOAD });
         let add = "Page.addScriptToEvaluateOnNewDocument";
         self.browser.call(add, &script);
@@ -214,12 +239,11 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Sets the vehicle's link free again, and lets go of everything.
-    pub(crate) fn recover(&mut self) {
-        self.bed.link.set(CLEAR);
+    /// Lets go of everything.
+    pub(crate) fn let_go_of_all(&mut self) {
         self.bed
             .display
-            .input("keyup w keyup s keyup Alt_L keyup Control_L mouseup 1 mouseup 3");
+            .input("keyup w keyup Alt_L keyup Super_L mouseup 1 mouseup 3");
     }
 
     /// Holds a source so that it drives ahead.
@@ -275,13 +299,12 @@ impl<'a> Operator<'a> {
 
     /// Lets an event happen to a source that is held. Returns the time of the last sign of life.
     pub(crate) fn happen(&mut self, event: Event, source: Source) -> Instant {
-        let closes = [
-            Event::LeftPage,
-            Event::ClosedTab,
-            Event::KilledBrowser,
-            Event::Dialog,
-        ];
-        self.is_open = !closes.contains(&event);
+        self.page = match event {
+            Event::Release => Page::Intact,
+            Event::KilledBrowser => Page::Killed,
+            Event::LeftPage | Event::ClosedTab | Event::Alert => Page::Closed,
+            _ => Page::Changed,
+        };
         let sign = Instant::now();
         match event {
             Event::Release => self.let_go(source),
@@ -307,12 +330,13 @@ impl<'a> Operator<'a> {
             Event::ClosedTab => self.browser.close_tab(),
             Event::KilledBrowser => {
                 self.browser.kill();
-                self.is_killed = true;
             }
             Event::Resize => self.resize(),
             Event::Rotation => self.rotate(),
-            Event::ModifierKey => self.bed.display.input("keydown Alt_L"),
-            Event::Dialog => drop(self.browser.value("setTimeout(() => alert('A dialog'))")),
+            Event::AltKey => self.bed.display.input("keydown Alt_L"),
+            Event::SuperKey => self.bed.display.input("keydown Super_L"),
+            Event::Dialog => drop(self.browser.value(OPEN_DIALOG)),
+            Event::Alert => drop(self.browser.value("setTimeout(() => alert('A dialog'))")),
             Event::LeftView => drop(
                 self.browser
                     .value("document.querySelector('[data-show=mission]').click()"),
@@ -327,6 +351,9 @@ impl<'a> Operator<'a> {
 
     /// A key or a button that stops the vehicle at once. Returns the time of it.
     pub(crate) fn stop(&mut self, how: Stop) -> Instant {
+        if how != Stop::Escape {
+            self.page = Page::Changed;
+        }
         let place = (how == Stop::RedButton).then(|| self.on_screen("#estop"));
         let sign = Instant::now();
         match (how, place) {
@@ -346,14 +373,12 @@ impl<'a> Operator<'a> {
             .holds_within(Duration::from_secs(30), IS_IN_EMERGENCY)
     }
 
-    /// Whether its page is still there and runs.
-    pub(crate) const fn is_open(&self) -> bool {
-        self.is_open
-    }
-
-    /// What the page says about driving.
+    /// What the page says about driving; nothing if it is closed.
     pub(crate) fn line(&mut self) -> String {
-        self.browser.text(LINE)
+        match self.page {
+            Page::Intact | Page::Changed => self.browser.text(LINE),
+            Page::Closed | Page::Killed => String::new(),
+        }
     }
 
     /// Starts a slow mission to the farther one of two destinations, and waits until the motors turn.

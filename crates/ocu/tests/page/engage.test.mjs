@@ -1,0 +1,80 @@
+// One button from arrival to driving by hand.
+
+import assert from "node:assert/strict";
+import test from "node:test";
+
+class Element extends EventTarget {
+  hidden = false;
+  textContent = "";
+  dataset = {};
+  children = [];
+  hasAttribute = () => false;
+  getAttribute = () => null;
+  setAttribute() {}
+  append() {}
+  remove() {}
+}
+
+let now = 0;
+globalThis.setTimeout = () => {};
+Object.defineProperty(globalThis, "performance", { value: { now: () => now }, configurable: true });
+const elements = new Map();
+globalThis.document = {
+  body: new Element(),
+  createElement: () => new Element(),
+  getElementById: (id) => elements.get(id) ?? elements.set(id, new Element()).get(id),
+};
+const { Engage } = await import("../../src/page/engage.js");
+
+const vehicle = (state) => ({ parts: [{ role: "primitive_driver", state, ours: true }] });
+const free = { control: {}, vehicle: vehicle("standby") };
+const held = (state) => ({ control: { held: true, wanted: true }, vehicle: vehicle(state) });
+
+/** An operator who has pressed the button; `asked` is what the page has asked the station for since. */
+function pressed() {
+  const asked = [];
+  let isReady = false;
+  const engage = new Engage(
+    async ({ type }) => (asked.push(type), null),
+    { drives: false },
+    () => (isReady = true),
+  );
+  engage.update(free, true, "");
+  elements.get("by-hand").dispatchEvent(new Event("click"));
+  return { engage, asked, isReady: () => isReady };
+}
+
+test("a packet that comes late does not take back the operator's word", async () => {
+  const { engage, asked, isReady } = pressed();
+  await null;
+  engage.update(free, false, "");
+  now += 400;
+  engage.update(held("standby"), false, "");
+  assert.deepEqual(asked, ["control"], "nothing is asked over a connection that does not answer");
+  now += 100;
+  engage.update(held("standby"), true, "");
+  await null;
+  assert.deepEqual(asked, ["control", "resume"]);
+  engage.update(held("ready"), true, "");
+  assert.ok(isReady());
+});
+
+test("a connection that stays lost ends it: the vehicle does not become ready when it comes back", async () => {
+  const { engage, asked, isReady } = pressed();
+  await null;
+  now += 2_500;
+  engage.update(held("standby"), false, "");
+  engage.update(held("standby"), true, "");
+  await null;
+  engage.update(held("ready"), true, "");
+  assert.deepEqual(asked, ["control"]);
+  assert.ok(!isReady());
+});
+
+test("an obstacle ends it at once", async () => {
+  const { engage, asked } = pressed();
+  engage.update(held("standby"), true, "Clear the emergency first");
+  engage.update(held("standby"), true, "");
+  await null;
+  assert.deepEqual(asked, ["control"]);
+});
