@@ -4,7 +4,7 @@
 //! A page sends `stop SUBSYSTEM` or `stop-all`, and repeats it until the vehicles have confirmed the
 //! emergency. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle,
 //! or `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an
-//! empty frame every second.
+//! empty frame every 10 s.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
