@@ -99,7 +99,8 @@ function render() {
 
 function renderState(live, operable, hindrance) {
   showControl(state, authority, operable, account, link.page);
-  engage.update(state, operable, hindrance);
+  // A connection that comes back goes on.
+  engage.update(state, operable, live ? hindrance : "");
   handover.update(state, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
   showMissing(state, live);

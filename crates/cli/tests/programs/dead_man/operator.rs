@@ -367,10 +367,9 @@ impl<'a> Operator<'a> {
         sign
     }
 
-    /// Waits until the page shows the emergency.
-    pub(crate) fn sees_emergency(&mut self) -> bool {
-        self.browser
-            .holds_within(Duration::from_secs(30), IS_IN_EMERGENCY)
+    /// Waits until the page shows the emergency, which is repeated until the vehicle confirms it.
+    pub(crate) fn wait_for_emergency(&mut self) {
+        self.browser.wait(IS_IN_EMERGENCY);
     }
 
     /// What the page says about driving; nothing if it is closed.
