@@ -143,8 +143,8 @@ impl<'a> Measurement<'a> {
         self.watch(event, link);
         let motors = &self.bed.motors;
         match drive {
+            Drive::Refused(_) if link.is_lossy() => Ending::NeverDriven,
             Drive::Refused(begun) => match motors.share_driven(begun, event) {
-                0.0 if link.is_lossy() => Ending::NeverDriven,
                 0.0 => Ending::Refused,
                 share => Ending::Jerks(share),
             },
@@ -159,12 +159,17 @@ impl<'a> Measurement<'a> {
         const ATTEMPTS: usize = 3;
         let taken_up = Instant::now();
         for _ in 0..ATTEMPTS {
-            if !self.operator.drive(source, Duration::from_secs(8)) {
-                break;
-            }
+            let motors = &self.bed.motors;
             // The event comes as long as the drive lasts.
             if link.is_lossy() {
-                return Drive::On;
+                let is_driven = || motors.drove_at(Instant::now());
+                if self.operator.drive(source, is_driven) {
+                    return Drive::On;
+                }
+                break;
+            }
+            if !self.operator.drive(source, || motors.drive()) {
+                break;
             }
             let begun = Instant::now();
             if link.begins == Begins::WhileDriving {

@@ -282,13 +282,13 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Holds a source until the motors turn, with a few attempts: the link may end a drive. Returns whether they turn.
-    pub(crate) fn drive(&mut self, source: Source, limit: Duration) -> bool {
-        let deadline = Instant::now() + limit;
+    /// Holds a source until the vehicle is driven, with a few attempts: the link may end a drive. Returns whether it is.
+    pub(crate) fn drive(&mut self, source: Source, is_driven: impl Fn() -> bool) -> bool {
+        let deadline = Instant::now() + Duration::from_secs(8);
         while Instant::now() < deadline {
             self.hold(source);
             let left = deadline.saturating_duration_since(Instant::now());
-            if within(left.min(Duration::from_secs(3)), || self.bed.motors.drive()) {
+            if within(left.min(Duration::from_secs(3)), &is_driven) {
                 return true;
             }
             self.let_go(source);
