@@ -3,7 +3,7 @@
 //! | word | the key may |
 //! |---|---|
 //! | `observe` | query, subscribe, report, and set an emergency; every trusted key may |
-//! | `command` | send commands as well |
+//! | `command` | send commands as well, and messages that no definition has |
 //! | `control=127` | send commands, and take control of components with an authority up to 127 |
 //! | `clear-emergency` | clear emergencies that it has set, and as the client in control those of clients that are gone |
 //! | `clear-emergency=any` | clear emergencies, also those of other clients |
@@ -16,9 +16,12 @@
 //! inside a request for an event, but not to those inside a list or a mission. Control, emergencies
 //! and configuration have words of their own: `only` does not concern them.
 //!
+//! A message that no definition has is a command: whoever knows it gives the right to it.
+//!
 //! Who may observe may set an emergency, because a stop must not fail for lack of a right, unless
 //! `except=SetEmergency` takes it away.
 
+mod known;
 mod permission;
 mod selection;
 

@@ -4,7 +4,6 @@ use std::ops::RangeInclusive;
 
 use jaus::codec::Message as _;
 use jaus::component::CLEAR_ALL;
-use jaus::messages;
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, ConfirmControl, ConfirmElementRequest, ConfirmEventRequest,
     CreateCommandEvent, CreateEvent, RegisterServices, RejectControl, RejectElementRequest,
@@ -12,10 +11,13 @@ use jaus::messages::core::{
     Shutdown, UpdateEvent,
 };
 
+use super::known;
+
 /// The codes that AS5710 sets aside for commands.
 const COMMANDS: RangeInclusive<u16> = 0x0000..=0x1FFF;
-/// The codes that it sets aside for commands of users.
-const COMMANDS_OF_USERS: RangeInclusive<u16> = 0xD000..=0xDFFF;
+/// Request Handoff of Enhanced Access Control (IOP): it may hand control over at once, with the authority that it
+/// names like Request Control.
+pub(super) const REQUEST_HANDOFF: u16 = 0xFF31;
 /// Answers that have codes of commands.
 const ANSWERS: [u16; 6] = [
     ConfirmControl::CODE,
@@ -47,7 +49,7 @@ impl Permission {
     /// The right that a message, which begins with this code, needs.
     pub(super) fn of(code: u16, message: &[u8]) -> Self {
         match code {
-            RequestControl::CODE | SetAuthority::CODE => Self::Control {
+            RequestControl::CODE | SetAuthority::CODE | REQUEST_HANDOFF => Self::Control {
                 // A message without an authority is malformed, and refused as if it asked for all.
                 authority: message.get(2).copied().unwrap_or(u8::MAX),
             },
@@ -72,6 +74,7 @@ pub(super) const fn is_recorded(code: u16) -> bool {
     matches!(
         code,
         RequestControl::CODE
+            | REQUEST_HANDOFF
             | ReleaseControl::CODE
             | SetAuthority::CODE
             | SetEmergency::CODE
@@ -82,17 +85,13 @@ pub(super) const fn is_recorded(code: u16) -> bool {
     )
 }
 
-/// In the range of AS5710 all but the answers are commands, whatever the definitions say; elsewhere
-/// the definitions tell, and for an unknown code of users its range.
+/// In the range of AS5710 all but the answers are commands, whatever the definitions say; elsewhere the definitions tell.
+/// What none of them has may do anything.
 fn is_command(code: u16) -> bool {
     if COMMANDS.contains(&code) {
         return !ANSWERS.contains(&code);
     }
-    let mut known = messages::registry().by_code(code).peekable();
-    match known.peek() {
-        Some(_) => known.any(|message| message.is_command),
-        None => COMMANDS_OF_USERS.contains(&code),
-    }
+    known::is_command(code).unwrap_or(true)
 }
 
 /// What a message carries.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
-use jaus::messages::registry;
+use super::known;
 
 /// Messages, as in `PrimitiveDriver,SetTravelSpeed,D103h`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -72,18 +72,6 @@ impl fmt::Display for Selection {
 /// The codes that a name stands for; none if it is unknown.
 fn codes_of(name: &str) -> Vec<u16> {
     let digits = name.strip_suffix(['h', 'H']).filter(|it| it.len() == 4);
-    if let Some(code) = digits.and_then(|it| u16::from_str_radix(it, 16).ok()) {
-        return vec![code];
-    }
-    let services = registry()
-        .services()
-        .filter(|it| names_service(it.id.urn, name));
-    let inputs = services.flat_map(|it| it.inputs.iter().copied());
-    let messages = registry().by_name(name).map(|it| it.code);
-    inputs.chain(messages).collect()
-}
-
-/// Whether a name is a service's: its URN, or what follows the last colon of it.
-fn names_service(urn: &str, name: &str) -> bool {
-    urn == name || urn.rsplit(':').next() == Some(name)
+    let code = digits.and_then(|it| u16::from_str_radix(it, 16).ok());
+    code.map_or_else(|| known::codes_of(name), |code| vec![code])
 }

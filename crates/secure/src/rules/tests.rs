@@ -141,18 +141,63 @@ fn a_command_inside_an_event_needs_the_same_rights() {
 }
 
 #[test]
-fn an_unknown_code_in_the_range_of_commands_is_a_command() {
-    let rules = Rules::default();
-    for (code, is_allowed) in [
-        (0xDABCu16, false),
-        (0xEABC, true),
-        (0xFABC, true),
-        (0x1ABC, false),
-    ] {
+fn what_no_definition_has_needs_the_right_to_command() {
+    let (observer, commander) = (Rules::default(), "command".parse::<Rules>().unwrap());
+    for code in [0xDABCu16, 0xEABC, 0xFABC, 0x1ABC, 0x2ABC, 0x4ABC] {
         let frame = frame(code.to_le_bytes().to_vec());
-        assert_eq!(rules.check(&frame).is_ok(), is_allowed, "{code:04X}");
+        assert_eq!(observer.check(&frame), Err(Refusal::Command), "{code:04X}");
+        assert_eq!(commander.check(&frame), Ok(()), "{code:04X}");
     }
-    assert_eq!(rules.check(&frame(&b"\x05"[..])), Err(Refusal::NoCode));
+    assert_eq!(observer.check(&frame(&b"\x05"[..])), Err(Refusal::NoCode));
+}
+
+#[test]
+fn no_key_that_observes_sends_what_a_definition_calls_a_command() {
+    // Each ends what its sender has, or stops.
+    const HARMLESS: [&str; 7] = [
+        "ReleaseControl",
+        "SetEmergency",
+        "RegisterServices",
+        "CreateEvent",
+        "UpdateEvent",
+        "CancelEvent",
+        "ConfirmControl",
+    ];
+    let rules = Rules::default();
+    let mut commands = 0;
+    for (code, name, is_command) in known::messages() {
+        let mut message = code.to_le_bytes().to_vec();
+        message.extend([0; 64]);
+        if is_command && !HARMLESS.contains(&name) {
+            commands += 1;
+            assert!(rules.check(&frame(message)).is_err(), "{code:04X} {name}");
+        } else if name.starts_with("Query") && known::is_command(code) == Some(false) {
+            assert_eq!(rules.check(&frame(message)), Ok(()), "{code:04X} {name}");
+        }
+    }
+    assert!(commands > 100, "{commands} commands");
+}
+
+#[test]
+fn a_request_for_a_handoff_is_a_request_for_control() {
+    let handoff = |authority: u8| {
+        let [low, high] = permission::REQUEST_HANDOFF.to_le_bytes();
+        frame(vec![low, high, authority, 0])
+    };
+    let check = |rules: &str, authority| rules.parse::<Rules>().unwrap().check(&handoff(authority));
+    assert_eq!(check("observe", 255), Err(Refusal::Control));
+    assert_eq!(check("command", 1), Err(Refusal::Control));
+    assert_eq!(check("control=10", 10), Ok(()));
+    let refused = Refusal::Authority {
+        asked: 255,
+        most: 10,
+    };
+    assert_eq!(check("control=10", 255), Err(refused));
+    assert_eq!(
+        check("control=10 except=RequestHandoff", 10),
+        Err(Refusal::Excluded)
+    );
+    assert!(is_recorded(&handoff(1)));
 }
 
 #[test]

@@ -412,10 +412,16 @@ impl<'a> Operator<'a> {
         self.let_go(source);
     }
 
+    /// Gives the window another size than it has, which its next tab keeps.
     fn resize(&mut self) {
         let window = self.browser.call("Browser.getWindowForTarget", &json!({}));
+        let width = if window["bounds"]["width"] == 1000 {
+            1200
+        } else {
+            1000
+        };
         let bounds =
-            json!({ "windowId": window["windowId"], "bounds": { "width": 1000, "height": 860 } });
+            json!({ "windowId": window["windowId"], "bounds": { "width": width, "height": 860 } });
         self.browser.call("Browser.setWindowBounds", &bounds);
     }
 
