@@ -196,7 +196,7 @@ impl Following {
         };
         async move {
             loop {
-                let asked = Instant::now();
+                let asked = now();
                 match component.query(peer, &query).await {
                     Ok(report) => {
                         if sighted.send((peer, report.into())).await.is_err() {
@@ -205,7 +205,7 @@ impl Following {
                     }
                     Err(error) => tracing::debug!(%peer, %error, "no scan"),
                 }
-                sleep(SCAN.max(asked.elapsed() * SCAN_SHARE)).await;
+                sleep(SCAN.max((now() - asked) * SCAN_SHARE)).await;
             }
         }
     }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use tokio::net::TcpListener;
 
 use super::base_map::BaseMap;
-use super::server::{Admission, Devices, Gate, Server, Trail, UserGate};
+use super::server::{Admission, Devices, Gate, MemoryBrowsers, Server, Trail, UserGate};
 use super::session::Session;
 use super::tls::Tls;
 use super::token::Token;
@@ -142,6 +142,68 @@ impl Station {
             address,
         })
     }
+
+    /// Runs without a socket, for browsers that are simulated in this process, on the clock of the
+    /// tokio runtime. Each is a stream of octets and its address.
+    ///
+    /// # Errors
+    /// If the component cannot start or continue.
+    #[doc(hidden)]
+    pub async fn run_in_memory(
+        self,
+        slot: Slot,
+        browsers: MemoryBrowsers,
+    ) -> Result<Infallible, PartError> {
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, Listen::PORT));
+        let (session, server) = self.start(slot, address)?;
+        tokio::select! {
+            error = session.run() => Err(error),
+            () = server.run_in_memory(browsers) => Err(server_has_ended()),
+        }
+    }
+
+    /// Starts the component. The page is at `address`.
+    fn start(self, slot: Slot, address: SocketAddr) -> Result<(Session, Server), PartError> {
+        let node = slot.node.clone();
+        let component = slot.component("Operator").live_on(slot.port)?;
+        slot.telemetry.attach(&component);
+        let trail = Trail::new(self.audit, component.id());
+        let gate = match (self.users, self.token) {
+            (Some(users), _) => {
+                let is_secure = self.tls.is_some();
+                let file =
+                    |folder: PathBuf| folder.join(format!("page-{}.devices", address.port()));
+                Gate::Users(Box::new(UserGate::new(
+                    users,
+                    Devices::load(self.state.map(file)),
+                    address.port(),
+                    is_secure,
+                    trail.clone(),
+                )))
+            }
+            (None, Some(token)) => Gate::Token {
+                token,
+                to_read: self.token_to_read,
+            },
+            (None, None) => {
+                tracing::warn!(
+                    "the page is unprotected: every user and program of this host may drive vehicles"
+                );
+                Gate::Open
+            }
+        };
+        let admission = Admission {
+            operator: component.id(),
+            authority: self.authority,
+            gate,
+            trail,
+            hosts: self.hosts,
+            base_map: self.base_map,
+            node,
+        };
+        let (session, access) = Session::new(component, self.vehicles, self.authority);
+        Ok((session, Server::new(admission, access)))
+    }
 }
 
 /// Name of the file with the generated token.
@@ -237,52 +299,17 @@ impl Part for OpenStation {
                  --https encrypts it"
             );
         }
-        let node = slot.node.clone();
-        let component = slot.component("Operator").live_on(slot.port)?;
-        slot.telemetry.attach(&component);
-        let trail = Trail::new(station.audit, component.id());
-        let gate = match (station.users, station.token) {
-            (Some(users), _) => {
-                let is_secure = station.tls.is_some();
-                let file =
-                    |folder: PathBuf| folder.join(format!("page-{}.devices", address.port()));
-                Gate::Users(Box::new(UserGate::new(
-                    users,
-                    Devices::load(station.state.map(file)),
-                    address.port(),
-                    is_secure,
-                    trail.clone(),
-                )))
-            }
-            (None, Some(token)) => Gate::Token {
-                token,
-                to_read: station.token_to_read,
-            },
-            (None, None) => {
-                tracing::warn!(
-                    "the page is unprotected: every user and program of this host may drive vehicles"
-                );
-                Gate::Open
-            }
-        };
-        let admission = Admission {
-            operator: component.id(),
-            authority: station.authority,
-            gate,
-            trail,
-            hosts: station.hosts,
-            base_map: station.base_map,
-            node,
-        };
-        let (session, access) = Session::new(component, station.vehicles, station.authority);
-        let server = Server::new(admission, access);
+        let tls = station.tls.clone();
+        let (session, server) = station.start(slot, address)?;
         tokio::select! {
             error = session.run() => Err(error),
-            () = server.run(listener, station.tls) => {
-                Err(PartError::Broken("the page's server has ended".to_owned()))
-            }
+            () = server.run(listener, tls) => Err(server_has_ended()),
         }
     }
+}
+
+fn server_has_ended() -> PartError {
+    PartError::Broken("the page's server has ended".to_owned())
 }
 
 async fn listen(listen: Listen) -> Result<TcpListener, PartError> {

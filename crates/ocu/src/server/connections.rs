@@ -16,8 +16,9 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use jaus_view::places::{Place, Places, Source};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, ReadBuf};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, Sleep, sleep, timeout};
 use tower::ServiceExt;
@@ -44,6 +45,9 @@ const NO_PLACE: &[u8] =
 /// Response to a request without TLS on a port with TLS.
 const NO_TLS: &[u8] = b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\n\
     Content-Length: 43\r\nConnection: close\r\n\r\nthis page requires https:// in its address\n";
+
+/// Connections of browsers that are simulated in this process, with their addresses.
+pub(crate) type MemoryBrowsers = mpsc::Receiver<(DuplexStream, SocketAddr)>;
 
 /// Serves connections for as long as the listener works.
 pub(super) async fn serve(listener: TcpListener, tls: Option<Tls>, router: Router) {
@@ -72,6 +76,20 @@ pub(super) async fn serve(listener: TcpListener, tls: Option<Tls>, router: Route
                 // Best effort: never wait for the peer.
                 let _ = stream.try_write(NO_PLACE);
             }
+        }
+    }
+}
+
+/// Serves connections that are made in this process, for as long as it makes them.
+pub(super) async fn serve_in_memory(mut browsers: MemoryBrowsers, router: Router) {
+    let mut tasks = JoinSet::new();
+    loop {
+        tokio::select! {
+            Some((stream, address)) = browsers.recv() => {
+                tasks.spawn(serve_http(stream, address, router.clone()));
+            }
+            Some(_) = tasks.join_next() => {}
+            else => return,
         }
     }
 }

@@ -14,6 +14,7 @@ use super::trail::Trail;
 use super::visitor::Visitor;
 use crate::token::Token;
 use crate::users::{PasswordHash, UserRole, Users, UsersFile};
+use jaus::node::now;
 
 /// The user of a page that requires no login.
 const OPERATOR: &str = "operator";
@@ -214,7 +215,7 @@ impl UserGate {
         let verified = spawn_blocking(verify).await.ok().flatten();
         let user = Arc::new(verified.ok_or(LoginError::Wrong)?);
         let secret = Token::generate().map_err(|_| LoginError::NoRandomness)?;
-        let displaced = self.logins().begin(Instant::now(), &secret, user, address);
+        let displaced = self.logins().begin(now(), &secret, user, address);
         if let Some(login) = displaced {
             self.trail.ended(&login, &Ending::Displaced);
         }
@@ -255,7 +256,7 @@ impl UserGate {
         };
         let mut logins = self.logins();
         if is_active {
-            logins.touch(Instant::now(), id);
+            logins.touch(now(), id);
         }
         logins.contains(id)
     }

@@ -19,6 +19,7 @@ use super::logins::{Ending, LoginId};
 use super::visitor::Visitor;
 use super::{Refusal, Shared};
 use crate::users::UserRole;
+use jaus::node::now;
 
 /// Deadline of a login's body.
 const BODY: Duration = Duration::from_secs(10);
@@ -98,7 +99,7 @@ pub(super) async fn log_in(
         Some(device) => Guesser::Device(device),
         None => Guesser::Address(Source::of(address)),
     };
-    let begun = shared.attempts().begin(Instant::now(), &guesser, &name);
+    let begun = shared.attempts().begin(now(), &guesser, &name);
     match begun {
         Ok(delay) => sleep(delay).await,
         Err(wait) => {
@@ -170,7 +171,7 @@ pub(super) async fn list(
         Ok(admitted) => admitted,
         Err(refusal) => return refusal.into_response(),
     };
-    let now = Instant::now();
+    let now = now();
     let seconds = |then| now.saturating_duration_since(then).as_secs();
     let logins = gate.logins();
     let listed = logins.all().into_iter().map(|login| ListedSession {

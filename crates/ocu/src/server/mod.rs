@@ -36,6 +36,7 @@ use tokio::sync::{Semaphore, oneshot};
 use tokio::time::{interval, sleep};
 
 use self::attempts::Attempts;
+pub(super) use self::connections::MemoryBrowsers;
 pub(super) use self::devices::Devices;
 pub(super) use self::gate::{Gate, UserGate};
 use self::socket::Introduction;
@@ -47,7 +48,7 @@ use super::page::{self, File};
 use super::tls::Tls;
 use super::users::UserRole;
 use jaus::address::JausId;
-use jaus::node::Node;
+use jaus::node::{Node, now};
 use jaus_view::Dictionary;
 
 /// Access rules, and the identity shown to pages.
@@ -159,7 +160,17 @@ impl Server {
 
     /// Serves pages for as long as the listener accepts connections, which has no end.
     pub(super) async fn run(self, listener: TcpListener, tls: Option<Tls>) {
-        let serving = connections::serve(listener, tls, self.router());
+        self.serve(connections::serve(listener, tls, self.router()))
+            .await;
+    }
+
+    /// Serves pages that are simulated in this process.
+    pub(super) async fn run_in_memory(self, browsers: MemoryBrowsers) {
+        self.serve(connections::serve_in_memory(browsers, self.router()))
+            .await;
+    }
+
+    async fn serve(&self, serving: impl Future<Output = ()>) {
         tokio::select! {
             () = serving => {}
             () = self.check_sessions() => {}
@@ -193,7 +204,7 @@ impl Server {
         loop {
             checks.tick().await;
             if let Some(gate) = self.shared.admission.gate.users() {
-                gate.handle_time(Instant::now());
+                gate.handle_time(now());
             }
         }
     }

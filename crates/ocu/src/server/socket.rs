@@ -24,6 +24,7 @@ use crate::ownership::{Owner, PageId};
 use crate::page_link::{PageLink, Seen, TooOld};
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::users::UserRole;
+use jaus::node::now;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
@@ -103,7 +104,7 @@ pub(super) async fn serve(
         snapshots: snapshots.clone(),
         answers,
         views,
-        frames: Bucket::new(Instant::now()),
+        frames: Bucket::new(now()),
         wrong_tokens: 0,
         refused: None,
     };
@@ -187,7 +188,7 @@ impl Reader<'_> {
                     return Some((close_code::SIZE, "frames are limited to 4096 octets"));
                 }
             };
-            if self.frames.take(Instant::now(), FRAMES).is_err() {
+            if self.frames.take(now(), FRAMES).is_err() {
                 self.shared.counters.too_much.fetch_add(1, Relaxed);
                 return Some((
                     close_code::POLICY,
@@ -208,7 +209,7 @@ impl Reader<'_> {
     }
 
     async fn handle(&mut self, text: &str) -> Option<Parting> {
-        let now = Instant::now();
+        let now = now();
         let frame = match Frame::read(text) {
             Ok(frame) => frame,
             Err(error) => {
@@ -311,7 +312,7 @@ impl Reader<'_> {
     /// Judges the age of a setpoint, and passes it on. The session confirms it, so that the page
     /// sends the next one only then.
     async fn drive(&mut self, id: Option<u64>, (forward, turn): (f64, f64), seen: Option<Seen>) {
-        let now = Instant::now();
+        let now = now();
         let vehicle = self.snapshots.borrow().vehicle;
         let waited = match seen {
             Some(seen) => self.link.lock().handle_setpoint(now, seen, vehicle),
@@ -417,7 +418,7 @@ impl Reader<'_> {
     /// are reported, at a limited rate.
     fn reply(&mut self, id: Option<u64>) -> Reply {
         let answers = self.answers.clone();
-        let now = Instant::now();
+        let now = now();
         let quiet = self.refused.is_some_and(|at| now < at + REFUSAL);
         if id.is_none() && !quiet {
             self.refused = Some(now);
@@ -477,7 +478,7 @@ impl Writer<'_> {
         lists.mark_changed();
         let mut pings = interval(PING);
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut links = interval_at(tokio::time::Instant::now() + LINK, LINK);
+        let mut links = interval_at(tokio::time::now() + LINK, LINK);
         links.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut next = vec![self.hello()];
         loop {
@@ -494,7 +495,7 @@ impl Writer<'_> {
             // All that is not an answer waits until the link has carried the last state.
             let may_watch = self.visitor.may(UserRole::Observe);
             let (is_free, left) = {
-                let (link, now) = (self.link.lock(), Instant::now());
+                let (link, now) = (self.link.lock(), now());
                 (link.may_send(now), link.left(now))
             };
             let may_send = may_watch && is_free;
@@ -542,7 +543,7 @@ impl Writer<'_> {
 
     /// Notes that a frame is sent which the page does not confirm.
     fn unconfirmed(&self, message: Message) -> Message {
-        self.link.lock().handle_frame(Instant::now());
+        self.link.lock().handle_frame(now());
         message
     }
 
@@ -566,14 +567,14 @@ impl Writer<'_> {
             return None;
         }
         let mut link = self.link.lock();
-        link.handle_sent(Instant::now(), snapshot.seq, snapshot.vehicle);
+        link.handle_sent(now(), snapshot.seq, snapshot.vehicle);
         Some(text(&snapshot.json))
     }
 
     fn links(&self) -> Message {
         let vehicle = self.snapshots.borrow().link;
         text(&json(&Answer::Link {
-            page: self.link.lock().quality(Instant::now()),
+            page: self.link.lock().quality(now()),
             vehicle_round_trip_ms: vehicle.round_trip_ms,
             vehicle_loss_percent: vehicle.loss_percent,
         }))

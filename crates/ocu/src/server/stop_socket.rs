@@ -21,6 +21,7 @@ use super::visitor::Visitor;
 use crate::orders::{StopOrder, StopReply, StopTarget};
 use crate::request::OperatorRequest;
 use crate::users::UserRole;
+use jaus::node::now;
 
 /// Interval of empty frames, by which the page knows that the connection works. TCP acknowledges each
 /// with 52 octets, and repeats it several times on a way back that has become slow.
@@ -62,7 +63,7 @@ impl<'s> Stops<'s> {
         Self {
             shared,
             visitor,
-            frames: Bucket::new(Instant::now()),
+            frames: Bucket::new(now()),
             answers,
             waiting,
         }
@@ -91,7 +92,7 @@ impl<'s> Stops<'s> {
     }
 
     async fn handle(&mut self, message: Message) -> Option<Parting> {
-        if self.frames.take(Instant::now(), FRAMES).is_err() {
+        if self.frames.take(now(), FRAMES).is_err() {
             self.shared.counters.too_much.fetch_add(1, Relaxed);
             return Some((close_code::POLICY, "too many frames"));
         }

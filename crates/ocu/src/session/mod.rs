@@ -30,7 +30,7 @@ use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, json};
 use super::pages::Pages;
 use super::state::{State, Tree};
 use jaus::component::{Component, Handlers, PeerClocks};
-use jaus::node::time_of_day;
+use jaus::node::{now, time_of_day};
 use jaus_vehicle::parts::PartError;
 use jaus_view::Timestamp;
 
@@ -120,28 +120,28 @@ impl Session {
         loop {
             tokio::select! {
                 biased;
-                Some(stop) = self.stops.recv() => self.handle_stop(Instant::now(), stop),
+                Some(stop) = self.stops.recv() => self.handle_stop(now(), stop),
                 changed = standing.changed() => if changed.is_err() {
                     return PartError::NodeStopped;
                 },
-                _ = beat.tick() => self.handle_beat(Instant::now()),
-                Some(order) = self.orders.recv() => self.handle_order(Instant::now(), order),
+                _ = beat.tick() => self.handle_beat(now()),
+                Some(order) = self.orders.recv() => self.handle_order(now(), order),
                 never = &mut measuring => match never {},
                 Some((by, mut report)) = self.sightings.recv() => {
                     if let Some(sampled) = report.sampled() {
                         sampled.measure(|stamp| self.clocks.age(by, stamp));
                     }
                     if let Some(vehicle) = self.fleet.get_mut(by.subsystem()) {
-                        vehicle.handle_report(Instant::now(), by, report);
+                        vehicle.handle_report(now(), by, report);
                     }
                 }
                 Some((part, content)) = self.notices.recv() => {
                     if let Some(vehicle) = self.fleet.get_mut(part.subsystem()) {
-                        vehicle.handle_handover(Instant::now(), part, &content, &mut self.client);
+                        vehicle.handle_handover(now(), part, &content, &mut self.client);
                     }
                 }
                 Some(finished) = self.client.finished() => {
-                    self.handle_finished(Instant::now(), finished);
+                    self.handle_finished(now(), finished);
                 }
             }
         }
