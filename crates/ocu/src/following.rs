@@ -2,7 +2,7 @@
 //! exists: all of the selected vehicle, and the few of the others that the list of vehicles shows.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
@@ -19,6 +19,7 @@ use jaus::messages::mobility::{
     QueryGlobalPose, QueryLocalOperatingZone, QueryLocalPose, QueryVelocityState,
     local_operating_zone,
 };
+use jaus::node::now;
 use jaus::service::ComponentEntry;
 use jaus_vehicle::messages::environment_sensing::query_range_sensor_data::{
     QueryRangeSensorDataRec, ReportCoordinateSystem,

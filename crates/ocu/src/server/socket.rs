@@ -478,7 +478,7 @@ impl Writer<'_> {
         lists.mark_changed();
         let mut pings = interval(PING);
         pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut links = interval_at(tokio::time::now() + LINK, LINK);
+        let mut links = interval_at(tokio::time::Instant::now() + LINK, LINK);
         links.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut next = vec![self.hello()];
         loop {

@@ -1,0 +1,101 @@
+//! One trial: the operators begin, things go wrong, and at the end, when all is well, both drive.
+
+use std::time::Duration;
+
+use jaus_test_kit::random::Random;
+
+use crate::cable::Wire;
+use crate::mishaps::{self, Mishaps};
+use crate::operator::{Intent, Operator};
+use crate::world::World;
+
+/// When things begin to go wrong.
+const BEGIN: Duration = Duration::from_secs(3);
+/// When they end.
+const END: Duration = Duration::from_secs(13);
+/// Then both operators drive within this time: control may have to time out first.
+const PATIENCE: Duration = Duration::from_secs(25);
+
+/// What was seen in a trial.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Outcome {
+    pub(crate) broken: Option<String>,
+    pub(crate) longest: Duration,
+    pub(crate) moved: u32,
+    pub(crate) emergencies: u32,
+    /// When the trial ended.
+    pub(crate) end: Duration,
+}
+
+/// A trial in which everything may go wrong.
+pub(crate) fn run_rough(seed: u64, is_traced: bool) -> Outcome {
+    let mut world = World::new(seed, [1.0; 5], is_traced);
+    let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Any));
+    let mut mishaps = Mishaps::new(BEGIN);
+    while world.now < END && world.witness.broken.is_none() {
+        mishaps.live(&mut world);
+        live(&mut world, &mut operators);
+    }
+    mishaps.heal(&mut world);
+    for (page, operator) in operators.iter_mut().enumerate() {
+        world.let_go(page);
+        operator.intent = Intent::Drive(page);
+    }
+    let end = world.now + PATIENCE;
+    while world.now < end && world.witness.broken.is_none() {
+        live(&mut world, &mut operators);
+        if world.witness.drives(0) && world.witness.drives(1) {
+            return outcome(world);
+        }
+    }
+    if world.witness.broken.is_none() {
+        let views: Vec<_> = world.pages.iter().map(|page| &page.view).collect();
+        let what = format!("all is well, and not both drive: {views:?}");
+        world.witness.broken = Some(what);
+    }
+    outcome(world)
+}
+
+/// A trial in which only the clocks are wrong, and the delays constant.
+pub(crate) fn run_quiet(seed: u64, is_traced: bool) -> Outcome {
+    let mut random = Random::new(seed);
+    let rates = [(); 5].map(|()| random.choose(&[1.0, 1.08, 0.92]));
+    let mut world = World::new(seed, rates, is_traced);
+    for page in 0..2 {
+        world.pages[page].cable.wire = Wire {
+            delay: Duration::from_millis(world.random.choose(&[1, 20, 100, 300])),
+            jitter: Duration::from_millis(world.random.choose(&[1, 20])),
+            ..Wire::good()
+        };
+    }
+    let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Drive(page)));
+    world.witness.is_quiet = true;
+    while world.now < END && world.witness.broken.is_none() {
+        if world.random.happens(1) {
+            mishaps::step_a_clock(&mut world);
+        }
+        live(&mut world, &mut operators);
+    }
+    if world.witness.broken.is_none() && world.witness.moved < 2 {
+        world.witness.broken = Some(format!("only {} hands drove", world.witness.moved));
+    }
+    outcome(world)
+}
+
+fn live(world: &mut World, operators: &mut [Operator]) {
+    for operator in operators {
+        operator.live(world);
+    }
+    world.step();
+}
+
+fn outcome(world: World) -> Outcome {
+    let witness = world.witness;
+    Outcome {
+        broken: witness.broken,
+        longest: witness.longest,
+        moved: witness.moved,
+        emergencies: witness.emergencies_checked,
+        end: world.now,
+    }
+}

@@ -1,0 +1,334 @@
+//! Judges every step of a trial: what moves has a living hand behind it.
+
+use std::time::Duration;
+
+use crate::air::Weather;
+use crate::cable::Wire;
+use crate::vehicle::Way;
+
+/// Motion ends so long after the last sign of life, and the time of one way.
+const DEAD_MAN: Duration = Duration::from_millis(500);
+/// The same if a second part of the way fails before the motion has ended: the limits of the page, 0.4 s,
+/// and of the vehicle follow each other.
+const DEAD_MAN_TWICE: Duration = Duration::from_millis(900);
+/// A key that has never been repeated counts for longer.
+const FIRST_REPEAT: Duration = Duration::from_millis(300);
+/// The station sends an emergency on at once.
+const EMERGENCY: Duration = Duration::from_millis(300);
+/// A setpoint that is taken up sets the vehicle in motion within this time, and the time of one way.
+const BEGINNING: Duration = Duration::from_millis(500);
+/// What begins to move begins by a setpoint that has waited no longer.
+const WAITING: Duration = Duration::from_millis(300);
+/// The steps of the simulation, one for each hop.
+const STEPS: Duration = Duration::from_millis(20);
+/// For how long the delays of the past count: the station's memory of round trips.
+const MEMORY: Duration = Duration::from_secs(11);
+
+/// What works at a moment.
+pub(crate) struct Lives {
+    pub(crate) pages: [bool; 2],
+    pub(crate) station: bool,
+    pub(crate) air: [bool; 2],
+    pub(crate) vehicles: [bool; 2],
+    pub(crate) wires: [Wire; 2],
+    pub(crate) weather: Weather,
+    /// Whether a page says that its connection is live.
+    pub(crate) live: [bool; 2],
+    /// Whether the programs run for so long that they know each other.
+    pub(crate) settled: [bool; 3],
+}
+
+/// Whether no datagram is lost or late.
+const fn is_smooth(lives: &Lives) -> bool {
+    lives.weather.detoured == 0 && !lives.weather.is_lossy()
+}
+
+/// A hand that holds or has held something, and the vehicle that it means.
+struct Hold {
+    page: usize,
+    vehicle: usize,
+    way: Way,
+    begun: Duration,
+    /// When all was well for the last time: the hand, and every part of the way to the motor.
+    alive: Duration,
+    over: bool,
+    /// The parts that have failed since then.
+    failed: u8,
+    /// A key that was never repeated.
+    is_first: bool,
+    /// Whether the page said that it can be driven.
+    was_ready: bool,
+    /// Whether it has moved the vehicle.
+    has_moved: bool,
+}
+
+/// An emergency stop on its way.
+struct Stop {
+    page: usize,
+    vehicle: usize,
+    at: Duration,
+}
+
+pub(crate) struct Witness {
+    /// The rate of the slowest clock: limits are measured by it.
+    slowest: f64,
+    holds: Vec<Hold>,
+    stops: Vec<Stop>,
+    /// Vehicles in emergency.
+    emergencies: [bool; 2],
+    /// The longest one-way times of the last seconds: page to station, and station to vehicle.
+    ways: Vec<(Duration, [Duration; 2], Duration)>,
+    driven: [Option<Way>; 2],
+    /// Whether nothing but clocks is wrong: then whoever holds drives.
+    pub(crate) is_quiet: bool,
+    pub(crate) broken: Option<String>,
+    /// The longest motion after a last sign of life, without the one-way time.
+    pub(crate) longest: Duration,
+    /// Hands that have moved a vehicle.
+    pub(crate) moved: u32,
+    pub(crate) emergencies_checked: u32,
+    is_traced: bool,
+}
+
+impl Witness {
+    pub(crate) const fn new(slowest: f64, is_traced: bool) -> Self {
+        Self {
+            slowest,
+            holds: Vec::new(),
+            stops: Vec::new(),
+            emergencies: [false; 2],
+            ways: Vec::new(),
+            driven: [None; 2],
+            is_quiet: false,
+            broken: None,
+            longest: Duration::ZERO,
+            moved: 0,
+            emergencies_checked: 0,
+            is_traced,
+        }
+    }
+
+    /// A clock has become slower.
+    pub(crate) const fn handle_rate(&mut self, rate: f64) {
+        self.slowest = self.slowest.min(rate);
+    }
+
+    pub(crate) fn hold(
+        &mut self,
+        now: Duration,
+        (page, vehicle, way): (usize, usize, Way),
+        was_ready: bool,
+    ) {
+        self.end(page, now, true);
+        self.holds.push(Hold {
+            page,
+            vehicle,
+            way,
+            begun: now,
+            alive: now,
+            over: false,
+            failed: 0,
+            is_first: false,
+            was_ready,
+            has_moved: false,
+        });
+    }
+
+    /// The hand of a page is over since `last`.
+    pub(crate) fn end(&mut self, page: usize, last: Duration, has_renewed: bool) {
+        for hold in self.holds.iter_mut().filter(|it| it.page == page && !it.over) {
+            hold.over = true;
+            hold.alive = hold.alive.min(last);
+            hold.is_first = !has_renewed;
+        }
+    }
+
+    pub(crate) fn stop(&mut self, now: Duration, page: usize, vehicle: usize) {
+        let at = now;
+        self.stops.push(Stop { page, vehicle, at });
+    }
+
+    pub(crate) const fn forget_emergency(&mut self, vehicle: usize) {
+        self.emergencies[vehicle] = false;
+    }
+
+    pub(crate) fn forget_emergencies(&mut self) {
+        self.emergencies = [false; 2];
+        self.stops.clear();
+    }
+
+    /// Whether the hand of a page has moved its vehicle and still holds it.
+    pub(crate) fn drives(&self, page: usize) -> bool {
+        let mut holds = self.holds.iter();
+        holds.any(|it| it.page == page && !it.over && it.has_moved)
+    }
+
+    pub(crate) fn observe(&mut self, now: Duration, lives: &Lives, driven: [Option<Way>; 2]) {
+        self.note_ways(now, lives);
+        self.note_lives(now, lives);
+        for vehicle in 0..driven.len() {
+            self.judge(now, vehicle, driven[vehicle], lives);
+        }
+        self.judge_stops(now, lives, driven);
+        self.driven = driven;
+        let longest = self.limit(DEAD_MAN_TWICE) + self.way([0, 1]) + lives.weather.detour;
+        self.holds
+            .retain(|it| !it.over || it.alive + longest + MEMORY > now);
+    }
+
+    fn note_ways(&mut self, now: Duration, lives: &Lives) {
+        let pages = [0, 1].map(|page| lives.wires[page].one_way());
+        let air = lives.weather.longest();
+        match self.ways.last_mut() {
+            Some(last) if (last.1, last.2) == (pages, air) => last.0 = now,
+            _ => self.ways.push((now, pages, air)),
+        }
+        self.ways.retain(|(at, ..)| *at + MEMORY > now);
+    }
+
+    /// The longest time of one way from these pages to a vehicle.
+    fn way<const N: usize>(&self, pages: [usize; N]) -> Duration {
+        let page = self.ways.iter().flat_map(|it| pages.map(|page| it.1[page]));
+        let air = self.ways.iter().map(|it| it.2);
+        page.max().unwrap_or_default() + air.max().unwrap_or_default() + STEPS
+    }
+
+    fn limit(&self, time: Duration) -> Duration {
+        time.div_f64(self.slowest)
+    }
+
+    fn note_lives(&mut self, now: Duration, lives: &Lives) {
+        for hold in &mut self.holds {
+            let dead = [
+                hold.over,
+                !lives.pages[hold.page],
+                !lives.station,
+                !lives.air[hold.vehicle],
+                !lives.vehicles[hold.vehicle],
+            ];
+            let dead = (0..).zip(dead).filter(|(_, is_dead)| *is_dead);
+            let dead = dead.fold(0, |dead, (part, _)| dead | 1 << part);
+            if dead == 0 {
+                (hold.alive, hold.failed) = (now, 0);
+            } else {
+                hold.failed |= dead;
+            }
+        }
+    }
+
+    /// Judges the motion of a vehicle.
+    fn judge(&mut self, now: Duration, vehicle: usize, driven: Option<Way>, lives: &Lives) {
+        for hold in self.holds.iter_mut().filter(|it| it.vehicle == vehicle) {
+            if driven == Some(hold.way) && !hold.has_moved && !hold.over {
+                hold.has_moved = true;
+                self.moved += 1;
+            }
+        }
+        if self.is_quiet {
+            self.judge_liveness(now, vehicle, driven);
+        }
+        let Some(way) = driven else {
+            return;
+        };
+        if self.emergencies[vehicle] {
+            return self.break_rule(now, format!("vehicle {vehicle} moves in emergency"));
+        }
+        let mut reasons = Vec::new();
+        for hold in self.holds.iter().filter(|it| (it.vehicle, it.way) == (vehicle, way)) {
+            let silence = now.saturating_sub(hold.alive);
+            let delay = self.delay_of(hold, lives);
+            let limit = match self.driven[vehicle] == driven || !is_smooth(lives) {
+                true => self.limit_of(hold) + delay,
+                false => self.limit(WAITING) + delay,
+            };
+            if silence <= limit {
+                let late = silence.saturating_sub(delay);
+                self.longest = self.longest.max(late);
+                return;
+            } else {
+                let (begun, failed) = (hold.begun, hold.failed);
+                reasons.push(format!(
+                    "the hand that held since {begun:.2?} was last alive {silence:.3?} ago, the \
+                     limit is {limit:.3?} (failed: {failed:b})"
+                ));
+            }
+        }
+        reasons.push("no other hand holds it".to_owned());
+        let reasons = reasons.join("; ");
+        self.break_rule(now, format!("vehicle {vehicle} moves {way:?}: {reasons}"));
+    }
+
+    /// Without any trouble, whoever holds a vehicle that is ready drives it.
+    fn judge_liveness(&mut self, now: Duration, vehicle: usize, driven: Option<Way>) {
+        let begins = self.limit(BEGINNING) + self.way([0, 1]);
+        let idle = |it: &&Hold| {
+            let is_due = it.was_ready && !it.over && now > it.begun + begins;
+            it.vehicle == vehicle && is_due && driven != Some(it.way)
+        };
+        if let Some(hold) = self.holds.iter().find(idle) {
+            let (page, begun) = (hold.page, hold.begun);
+            let what = format!("page {page} holds vehicle {vehicle} since {begun:.2?}");
+            self.break_rule(now, format!("{what}, and it does not move"));
+        }
+    }
+
+    /// The time of one way for a hand, with what is late on it.
+    fn delay_of(&self, hold: &Hold, lives: &Lives) -> Duration {
+        /// Without the station or the network between it and the vehicle, no stop overtakes a setpoint that
+        /// makes a detour.
+        const BEYOND_PAGE: u8 = 0b1_1100;
+        let way = self.way([hold.page]);
+        if hold.failed & BEYOND_PAGE == 0 {
+            return way;
+        }
+        way + lives.weather.detour
+    }
+
+    fn limit_of(&self, hold: &Hold) -> Duration {
+        let is_single = hold.failed.count_ones() <= 1;
+        let limit = if is_single { DEAD_MAN } else { DEAD_MAN_TWICE };
+        let first = if hold.is_first {
+            FIRST_REPEAT
+        } else {
+            Duration::ZERO
+        };
+        self.limit(limit + first)
+    }
+
+    /// Judges emergency stops over links that are free.
+    fn judge_stops(&mut self, now: Duration, lives: &Lives, driven: [Option<Way>; 2]) {
+        let is_free = |stop: &Stop| {
+            let wire = &lives.wires[stop.page];
+            let is_quick = wire.lost == 0 && wire.rate.is_none() && !lives.weather.is_lossy();
+            let is_alive = lives.pages[stop.page] && lives.station;
+            let is_known = lives.settled[0] && lives.settled[1 + stop.vehicle];
+            let reaches = lives.live[stop.page] && lives.air[stop.vehicle] && is_known;
+            is_quick && is_alive && reaches && lives.vehicles[stop.vehicle]
+        };
+        self.stops.retain(is_free);
+        for stop in std::mem::take(&mut self.stops) {
+            if now <= stop.at + self.limit(EMERGENCY) + self.way([stop.page]) {
+                self.stops.push(stop);
+                continue;
+            }
+            self.emergencies_checked += 1;
+            self.emergencies[stop.vehicle] = true;
+            if driven[stop.vehicle].is_some() {
+                let (vehicle, late) = (stop.vehicle, now - stop.at);
+                self.break_rule(
+                    now,
+                    format!("vehicle {vehicle} moves {late:.2?} after its stop"),
+                );
+            }
+        }
+    }
+
+    fn break_rule(&mut self, now: Duration, what: String) {
+        if self.broken.is_none() {
+            if self.is_traced {
+                eprintln!("{:>9.3} BROKEN: {what}", now.as_secs_f64());
+            }
+            self.broken = Some(format!("at {:.3} s: {what}", now.as_secs_f64()));
+        }
+    }
+}
