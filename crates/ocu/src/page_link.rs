@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use jaus::service::MOST_SLEW;
 use serde::{Deserialize, Serialize};
 
 /// The last state that the operator has seen, as a page reports it.
@@ -128,6 +129,9 @@ impl PageLink {
     const MOST_UNDER_WAY: usize = 10;
     /// Most round trips kept.
     const MOST_SAMPLES: usize = 256;
+    /// The page's clock runs so many times as fast as the station's at most: one is slewed forward while
+    /// the other one is slewed back.
+    const SLEW: f64 = (1.0 + MOST_SLEW) / (1.0 - MOST_SLEW);
     /// Without a confirmation for this time, the way back does not work.
     const SILENCE: Duration = Duration::from_secs(1);
 
@@ -217,15 +221,20 @@ impl PageLink {
         let state = self.sent.iter().find(|it| it.seq == seen.seq).copied();
         let state = state.ok_or(TooOld::Unseen)?;
         let elapsed = now.saturating_duration_since(state.at);
-        // The page rounds to milliseconds. What it has shown for longer than it exists is no sample:
-        // it would make the shortest round trip 0.
         let held = Duration::from_millis(seen.held_ms);
-        if held > elapsed + Duration::from_millis(1) {
+        // The page rounds to milliseconds.
+        let rounded = Duration::from_millis(1);
+        if held > elapsed.mul_f64(Self::SLEW) + rounded {
             return Err(TooOld::Unseen);
         }
         let round_trip = elapsed.saturating_sub(held);
         let is_first = self.arrived.is_none_or(|arrived| seen.seq > arrived);
         self.handle_received(now, seen.seq);
+        // What it has shown for longer than it exists is no sample: it would make the shortest round
+        // trip 0.
+        if held > elapsed + rounded {
+            return Ok((state, round_trip));
+        }
         self.remember(now, round_trip);
         if is_first {
             self.adapt(now, round_trip);
@@ -427,15 +436,28 @@ mod tests {
     #[test]
     fn a_page_that_claims_to_have_shown_a_state_for_too_long_makes_no_round_trip() {
         let (mut link, now, seq) = link(200);
-        for held in [202, 100_000, u64::MAX] {
+        for held in [240, 100_000, u64::MAX] {
             let refused = link.handle_setpoint(now, seen(seq, held), ROVER);
             assert_eq!(refused, Err(TooOld::Unseen), "{held}");
         }
+        link.handle_setpoint(now, seen(seq, 202), ROVER).unwrap();
         let quality = link.quality(now);
         assert_eq!(
             (quality.round_trip_ms, quality.loss_percent),
             (Some(200), Some(0))
         );
+    }
+
+    #[test]
+    fn a_page_whose_clock_is_slewed_drives_over_a_short_link() {
+        let (mut link, now, seq) = link(4);
+        for held in [100, 200, 300] {
+            // The page's clock gains 8 % while the station's loses 8 %.
+            let shown = held * 108 / 92;
+            let waited = link.handle_setpoint(now + ms(held), seen(seq, shown), ROVER);
+            assert_eq!(waited, Ok(Duration::ZERO), "{held}");
+        }
+        assert_eq!(link.quality(now + ms(300)).round_trip_ms, Some(4));
     }
 
     #[test]

@@ -40,6 +40,7 @@ mod page;
 #[path = "../../../../tests/sim/seeds.rs"]
 mod seeds;
 mod station;
+mod story;
 mod trial;
 mod vehicle;
 mod witness;
@@ -71,13 +72,16 @@ fn wrong_clocks_stop_no_hand_that_holds() {
     );
 }
 
-fn check(test: &str, usual: u64, run: impl Fn(u64, bool) -> Outcome + Sync) {
+fn check(test: &str, usual: u64, run: impl Fn(u64) -> Outcome + Sync) {
     let totals = Mutex::new(Totals::default());
     let kept = include_str!("failed_seeds.txt");
     seeds::for_kept_and_fresh_seeds(test, kept, usual, |seed| {
-        let outcome = run(seed, seeds::is_traced());
+        let outcome = run(seed);
         totals.lock().unwrap().add(&outcome);
-        outcome.broken.map_or(Ok(()), Err)
+        match outcome.broken {
+            Some(broken) => Err(format!("{broken}\n{}", story::tell())),
+            None => Ok(()),
+        }
     });
     let totals = totals.into_inner().unwrap();
     seeds::announce(&format!("{test}: {totals:.3?}"));
@@ -107,7 +111,7 @@ impl Totals {
 #[test]
 fn a_seed_gives_the_same_trial_again() {
     for seed in [1, 2] {
-        let runs = [trial::run_rough(seed, false), trial::run_rough(seed, false)];
+        let runs = [trial::run_rough(seed), trial::run_rough(seed)];
         assert_eq!(runs[0], runs[1], "seed {seed}");
     }
 }

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::browser::{self, Load, Thaw};
 use crate::cable::{Cable, Connection, Frame};
+use crate::story;
 use crate::vehicle::Way;
 
 /// What the operator holds.
@@ -37,7 +38,9 @@ pub(crate) struct Grip {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct View {
     pub(crate) vehicle: u16,
+    /// The line on manual driving, and the last notice.
     pub(crate) line: String,
+    notice: String,
     pub(crate) emergency: String,
     pub(crate) by_hand: bool,
     /// How the page's connection is.
@@ -161,10 +164,17 @@ impl Page {
                 }
             }
         }
-        let text = |name: &str| deeds.view[name].as_str().unwrap_or_default().to_owned();
+        for (name, before) in [("line", &self.view.line), ("notice", &self.view.notice)] {
+            let words = text_of(&deeds.view, name);
+            if words != *before && !words.is_empty() {
+                story::note(now, &format!("page {} says: {words}", self.number));
+            }
+        }
+        let text = |name: &str| text_of(&deeds.view, name);
         self.view = View {
             vehicle: deeds.view["vehicle"].as_u64().unwrap_or_default() as u16,
             line: text("line"),
+            notice: text("notice"),
             emergency: text("emergency"),
             by_hand: deeds.view["byHand"] == true,
             link: text("link"),
@@ -278,4 +288,8 @@ impl Page {
             Way::Backward => -1.0,
         }
     }
+}
+
+fn text_of(view: &Value, name: &str) -> String {
+    view[name].as_str().unwrap_or_default().to_owned()
 }

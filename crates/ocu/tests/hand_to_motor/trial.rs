@@ -28,11 +28,11 @@ pub(crate) struct Outcome {
 }
 
 /// A trial in which everything may go wrong.
-pub(crate) fn run_rough(seed: u64, is_traced: bool) -> Outcome {
-    let mut world = World::new(seed, [1.0; 5], is_traced);
+pub(crate) fn run_rough(seed: u64) -> Outcome {
+    let mut world = World::new(seed, [1.0; 5]);
     let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Any));
     let mut mishaps = Mishaps::new(BEGIN);
-    while world.now < END && world.witness.broken.is_none() {
+    while world.now < END && !world.witness.is_done(world.now) {
         mishaps.live(&mut world);
         live(&mut world, &mut operators);
     }
@@ -42,7 +42,7 @@ pub(crate) fn run_rough(seed: u64, is_traced: bool) -> Outcome {
         operator.intent = Intent::Drive(page);
     }
     let end = world.now + PATIENCE;
-    while world.now < end && world.witness.broken.is_none() {
+    while world.now < end && !world.witness.is_done(world.now) {
         live(&mut world, &mut operators);
         if world.witness.drives(0) && world.witness.drives(1) {
             return outcome(world);
@@ -57,21 +57,21 @@ pub(crate) fn run_rough(seed: u64, is_traced: bool) -> Outcome {
 }
 
 /// A trial in which only the clocks are wrong, and the delays constant.
-pub(crate) fn run_quiet(seed: u64, is_traced: bool) -> Outcome {
+pub(crate) fn run_quiet(seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let rates = [(); 5].map(|()| random.choose(&[1.0, 1.08, 0.92]));
-    let mut world = World::new(seed, rates, is_traced);
+    let mut world = World::new(seed, rates);
     for page in 0..2 {
         world.pages[page].cable.wire = Wire {
-            delay: Duration::from_millis(world.random.choose(&[1, 20, 100, 300])),
+            delay: Duration::from_millis(world.random.choose(&[1, 20, 100, 200])),
             jitter: Duration::from_millis(world.random.choose(&[1, 20])),
             ..Wire::good()
         };
     }
     let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Drive(page)));
     world.witness.is_quiet = true;
-    while world.now < END && world.witness.broken.is_none() {
-        if world.random.happens(1) {
+    while world.now < END && !world.witness.is_done(world.now) {
+        if world.random.happens(2) {
             mishaps::step_a_clock(&mut world);
         }
         live(&mut world, &mut operators);

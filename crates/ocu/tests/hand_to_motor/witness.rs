@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::air::Weather;
 use crate::cable::Wire;
+use crate::story;
 use crate::vehicle::Way;
 
 /// Motion ends so long after the last sign of life, and the time of one way.
@@ -19,8 +20,12 @@ const EMERGENCY: Duration = Duration::from_millis(300);
 const BEGINNING: Duration = Duration::from_millis(500);
 /// What begins to move begins by a setpoint that has waited no longer.
 const WAITING: Duration = Duration::from_millis(300);
+/// For so long a trial goes on in which a rule is broken.
+const EPILOGUE: Duration = Duration::from_secs(1);
+/// What is not there after a start may still be on its way.
+const PROLOGUE: Duration = Duration::from_secs(5);
 /// The steps of the simulation, one for each hop.
-const STEPS: Duration = Duration::from_millis(20);
+const STEPS: Duration = Duration::from_millis(40);
 /// For how long the delays of the past count: the station's memory of round trips.
 const MEMORY: Duration = Duration::from_secs(11);
 
@@ -82,16 +87,16 @@ pub(crate) struct Witness {
     /// Whether nothing but clocks is wrong: then whoever holds drives.
     pub(crate) is_quiet: bool,
     pub(crate) broken: Option<String>,
+    broken_at: Duration,
     /// The longest motion after a last sign of life, without the one-way time.
     pub(crate) longest: Duration,
     /// Hands that have moved a vehicle.
     pub(crate) moved: u32,
     pub(crate) emergencies_checked: u32,
-    is_traced: bool,
 }
 
 impl Witness {
-    pub(crate) const fn new(slowest: f64, is_traced: bool) -> Self {
+    pub(crate) const fn new(slowest: f64) -> Self {
         Self {
             slowest,
             holds: Vec::new(),
@@ -101,10 +106,10 @@ impl Witness {
             driven: [None; 2],
             is_quiet: false,
             broken: None,
+            broken_at: Duration::ZERO,
             longest: Duration::ZERO,
             moved: 0,
             emergencies_checked: 0,
-            is_traced,
         }
     }
 
@@ -161,6 +166,11 @@ impl Witness {
     pub(crate) fn drives(&self, page: usize) -> bool {
         let mut holds = self.holds.iter();
         holds.any(|it| it.page == page && !it.over && it.has_moved)
+    }
+
+    /// Whether nothing more is to be seen: a rule was broken a while ago, so that the story has its end.
+    pub(crate) fn is_done(&self, now: Duration) -> bool {
+        self.broken.is_some() && now > self.broken_at + EPILOGUE
     }
 
     pub(crate) fn observe(&mut self, now: Duration, lives: &Lives, driven: [Option<Way>; 2]) {
@@ -263,6 +273,7 @@ impl Witness {
         let begins = self.limit(BEGINNING) + self.way([0, 1]);
         let idle = |it: &&Hold| {
             let is_due = it.was_ready && !it.over && now > it.begun + begins;
+            let is_due = is_due && it.begun > PROLOGUE;
             it.vehicle == vehicle && is_due && driven != Some(it.way)
         };
         if let Some(hold) = self.holds.iter().find(idle) {
@@ -325,9 +336,8 @@ impl Witness {
 
     fn break_rule(&mut self, now: Duration, what: String) {
         if self.broken.is_none() {
-            if self.is_traced {
-                eprintln!("{:>9.3} BROKEN: {what}", now.as_secs_f64());
-            }
+            story::note(now, &format!("BROKEN: {what}"));
+            self.broken_at = now;
             self.broken = Some(format!("at {:.3} s: {what}", now.as_secs_f64()));
         }
     }

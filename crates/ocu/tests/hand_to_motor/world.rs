@@ -12,11 +12,12 @@ use crate::cable::Frame;
 use crate::host::Host;
 use crate::page::{Device, Page};
 use crate::station::StationProgram;
+use crate::story;
 use crate::vehicle::{self, SharedMotors, Way};
 use crate::witness::{Lives, Witness};
 
 /// What happens within a step happens at its end.
-const STEP: Duration = Duration::from_millis(2);
+const STEP: Duration = Duration::from_millis(4);
 /// After this time programs know each other.
 const SETTLED: Duration = Duration::from_secs(5);
 pub(crate) const VEHICLES: [u16; 2] = [101, 102];
@@ -36,13 +37,13 @@ pub(crate) struct World {
     ordered: [Drive; 2],
     pub(crate) pages: Vec<Page>,
     pub(crate) witness: Witness,
-    is_traced: bool,
 }
 
 impl World {
     /// Programs and pages start at once. The clocks run at these rates: those of the station, the
     /// vehicles and the pages.
-    pub(crate) fn new(seed: u64, rates: [f64; 5], is_traced: bool) -> Self {
+    pub(crate) fn new(seed: u64, rates: [f64; 5]) -> Self {
+        story::begin();
         let mut random = Random::new(seed);
         let pages = [Way::Forward, Way::Backward].into_iter().enumerate();
         let page = |(number, way)| Page::new(number, way, random.number(), rates[3 + number]);
@@ -56,9 +57,8 @@ impl World {
             motors: [SharedMotors::new(), SharedMotors::new()],
             ordered: [Drive::Stop; 2],
             pages,
-            witness: Witness::new(rates.into_iter().fold(1.0, f64::min), is_traced),
+            witness: Witness::new(rates.into_iter().fold(1.0, f64::min)),
             random,
-            is_traced,
         };
         world.start_station();
         for vehicle in 0..VEHICLES.len() {
@@ -71,9 +71,7 @@ impl World {
     }
 
     pub(crate) fn trace(&self, what: impl FnOnce() -> String) {
-        if self.is_traced {
-            eprintln!("{:>9.3} {}", self.now.as_secs_f64(), what());
-        }
+        story::note(self.now, &what());
     }
 
     // Programs.

@@ -204,6 +204,7 @@ class Page {
       link: this.#document.body.dataset.link,
       control: this.#document.body.dataset.control,
       line: this.#document.getElementById("drive-line").textContent,
+      notice: this.#document.getElementById("toasts").children.at(-1)?.dataset.text ?? "",
       source: this.#document.getElementById("drive-source").textContent,
       emergency: this.#document.body.dataset.emergency,
       byHand: !this.#document.getElementById("by-hand").hidden,
