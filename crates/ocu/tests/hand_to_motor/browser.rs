@@ -60,11 +60,9 @@ pub(crate) fn run(page: usize, now: f64, load: Load, thaw: Thaw, events: &[Value
         Thaw::Timers => "timers",
         Thaw::Events => "events",
     };
-    let order =
-        json!({"page": page, "now": now, "open": open, "thaws": thaws, "events": events});
-    let mut answer = BROWSER.with_borrow_mut(|browser| {
-        browser.get_or_insert_with(Browser::start).ask(&order)
-    });
+    let order = json!({"page": page, "now": now, "open": open, "thaws": thaws, "events": events});
+    let mut answer =
+        BROWSER.with_borrow_mut(|browser| browser.get_or_insert_with(Browser::start).ask(&order));
     if let Some(error) = answer["error"].as_str() {
         BROWSER.with_borrow_mut(|browser| *browser = None);
         panic!("the page fails: {error}\nafter {order}");

@@ -46,8 +46,9 @@ impl Wire {
     }
 
     fn time_of(&self, octets: usize) -> Duration {
-        self.rate
-            .map_or(Duration::ZERO, |rate| Duration::from_secs_f64(octets as f64 / rate))
+        self.rate.map_or(Duration::ZERO, |rate| {
+            Duration::from_secs_f64(octets as f64 / rate)
+        })
     }
 }
 

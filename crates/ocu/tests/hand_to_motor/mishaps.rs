@@ -166,7 +166,12 @@ pub(crate) fn step_a_clock(world: &mut World) {
     let host = world.random.below(3);
     let seconds = world.random.choose(&[0.2, 1.0, 60.0, 86_400.0, 3e7]);
     let sign = world.random.choose(&[-1.0, 1.0]);
-    world.trace(|| format!("the clock of host {host} is stepped by {} s", sign * seconds));
+    world.trace(|| {
+        format!(
+            "the clock of host {host} is stepped by {} s",
+            sign * seconds
+        )
+    });
     world.host(host).step_clock(sign * seconds);
 }
 

@@ -141,7 +141,11 @@ impl Witness {
 
     /// The hand of a page is over since `last`.
     pub(crate) fn end(&mut self, page: usize, last: Duration, has_renewed: bool) {
-        for hold in self.holds.iter_mut().filter(|it| it.page == page && !it.over) {
+        for hold in self
+            .holds
+            .iter_mut()
+            .filter(|it| it.page == page && !it.over)
+        {
             hold.over = true;
             hold.alive = hold.alive.min(last);
             hold.is_first = !has_renewed;
@@ -244,7 +248,11 @@ impl Witness {
             return self.break_rule(now, format!("vehicle {vehicle} moves in emergency"));
         }
         let mut reasons = Vec::new();
-        for hold in self.holds.iter().filter(|it| (it.vehicle, it.way) == (vehicle, way)) {
+        for hold in self
+            .holds
+            .iter()
+            .filter(|it| (it.vehicle, it.way) == (vehicle, way))
+        {
             let silence = now.saturating_sub(hold.alive);
             let delay = self.delay_of(hold, lives);
             let limit = match self.driven[vehicle] == driven || !is_smooth(lives) {
