@@ -127,6 +127,7 @@ export class Element extends Target {
 
   setAttribute(name, value) {
     this.#attributes.set(name, String(value));
+    if (name === "class") this.#document.structure++;
     if (name === "disabled") this.disabled = true;
     this.#document.handleMutation(this, name);
   }
@@ -181,19 +182,21 @@ export class Element extends Target {
   insertBefore(node, before) {
     if (!(node instanceof Element)) return void (this.text += String(node));
     node.remove();
+    this.#document.structure++;
     const at = before === null ? this.children.length : this.children.indexOf(before);
     this.children.splice(at, 0, node);
     node.parent = this;
   }
 
   replaceChildren(...nodes) {
-    for (const child of this.children) child.parent = null;
-    [this.children, this.text] = [[], ""];
+    for (const child of [...this.children]) child.remove();
+    this.text = "";
     this.append(...nodes);
   }
 
   remove() {
     if (!(this.parent instanceof Element)) return;
+    this.#document.structure++;
     this.parent.children = this.parent.children.filter((child) => child !== this);
     this.parent = null;
   }
@@ -263,16 +266,26 @@ export class Element extends Target {
 
 const dataName = (name) => `data-${String(name).replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`)}`;
 
+/** The tests of each selector that was used before. */
+const tests = new Map();
+
 /** Matches a compound selector of tag, class, id and attribute, without combinators. */
 function isMatch(element, selector) {
+  if (!tests.has(selector)) tests.set(selector, compile(selector));
+  return tests.get(selector).every((test) => test(element));
+}
+
+function compile(selector) {
   const parts = selector.match(/^[a-z0-9]+|\.[\w-]+|#[\w-]+|\[[^\]]+\]/g) ?? [];
   if (parts.join("") !== selector) throw new Error(`a selector that this document does not know: ${selector}`);
-  return parts.every((part) => {
-    if (part[0] === ".") return element.classList.contains(part.slice(1));
-    if (part[0] === "#") return element.id === part.slice(1);
-    if (part[0] !== "[") return element.tag === part;
-    const [name, value] = part.slice(1, -1).split("=");
-    return value === undefined ? element.hasAttribute(name) : element.getAttribute(name) === value.replaceAll('"', "");
+  return parts.map((part) => {
+    const name = part.slice(1);
+    if (part[0] === ".") return (element) => element.classList.contains(name);
+    if (part[0] === "#") return (element) => element.id === name;
+    if (part[0] !== "[") return (element) => element.tag === part;
+    const [attribute, value] = part.slice(1, -1).split("=");
+    if (value === undefined) return (element) => element.hasAttribute(attribute);
+    return (element) => element.getAttribute(attribute) === value.replaceAll('"', "");
   });
 }
 
@@ -283,7 +296,11 @@ export class Document extends Target {
   activeElement = null;
   documentElement = new Element(this, "html");
   body = null;
+  /** Counts the changes of tree and classes. */
+  structure = 0;
   #ids = new Map();
+  /** What the page has asked for since the last such change: it asks for its own markup again and again. */
+  #found = { structure: -1, all: new Map() };
   #observers = new Set();
 
   /** Reads a page as the project writes it. */
@@ -317,7 +334,10 @@ export class Document extends Target {
   }
 
   querySelectorAll(selectors) {
-    return this.documentElement.querySelectorAll(selectors);
+    if (this.#found.structure !== this.structure) this.#found = { structure: this.structure, all: new Map() };
+    const { all } = this.#found;
+    if (!all.has(selectors)) all.set(selectors, this.documentElement.querySelectorAll(selectors));
+    return all.get(selectors);
   }
 
   observe(observer) {
