@@ -250,6 +250,22 @@ fn a_slew_hides_no_delay() {
     }
 }
 
+#[test]
+fn a_clock_that_is_slewed_since_its_last_measurement_hides_no_delay() {
+    let mut sensor = Sensor::new();
+    sensor.measure();
+    sensor.slew = MOST_SLEW;
+    sensor.report(125);
+    // Each sample is half a second late from now on.
+    sensor.pass(Duration::from_millis(500));
+    for _ in 0..12 {
+        sensor.pass(PERIOD);
+        sensor.receive(sensor.clock - 0.5 * (1.0 + sensor.slew));
+        let age = sensor.age().as_secs_f64();
+        assert!((0.4..0.6).contains(&age), "{age} s");
+    }
+}
+
 /// One second of a sensor: its slew, the step of its clock at the end, and the greatest delay.
 fn second() -> impl Strategy<Value = (f64, f64, f64)> {
     let step = prop_oneof![4 => Just(0.0), 1 => -100.0..100.0_f64];

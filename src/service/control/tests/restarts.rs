@@ -1,8 +1,14 @@
 //! Clients that restart, faster than any silence limit.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
 use super::*;
-use crate::endpoint::Outgoing;
+use crate::endpoint::{Outgoing, Received};
 use crate::service::life::Life;
+use crate::service::stack_rig::US;
+use crate::service::{Discovery, Handlers, Kind, Profile, Scope, Timing};
+use crate::wire::{Broadcast, Priority};
 
 /// The numbers of two starts of a client.
 const OLD: u64 = 7;
@@ -36,7 +42,11 @@ impl Rig {
 
     /// A ready component that the old `FIRST` controls, after some time.
     fn driven() -> Self {
-        let mut rig = Self::managed();
+        Self::managed().drive()
+    }
+
+    fn drive(self) -> Self {
+        let mut rig = self;
         rig.introduce(FIRST, OLD);
         rig.request(FIRST, 100);
         rig.hear(FIRST, &Resume);
@@ -112,4 +122,72 @@ fn another_component_that_restarts_changes_nothing() {
         (rig.state(), rig.controller()),
         (State::Ready, Some((FIRST, 100)))
     );
+}
+
+/// The registration of a component with this service.
+fn offers_incarnation() -> RegisterServices {
+    let service = register_services::ServiceRec {
+        uri: incarnation::URN.into(),
+        major_version_number: 1,
+        minor_version_number: 0,
+    };
+    RegisterServices {
+        service_list: vec![service],
+    }
+}
+
+#[test]
+fn a_client_that_offers_the_service_and_has_not_told_its_incarnation_is_asked_for_it() {
+    let mut rig = Rig::managed();
+    // With search, the component knows what its client offers.
+    let profile = Profile::new(Kind::Vehicle, "Rover");
+    let discovery = Discovery::new(US, profile, Scope::System, Timing::default(), 1);
+    rig.stack = Stack::new(discovery, Vec::new()).management(Management::new());
+    rig.hear(FIRST, &offers_incarnation());
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    let asked = rig.answer_for(Duration::from_secs(1), FIRST, OLD);
+    assert!(!asked.is_empty());
+    rig.answer_for(Duration::from_millis(500), FIRST, NEW);
+    assert_eq!((rig.state(), rig.controller()), (State::Standby, None));
+}
+
+/// A ready component of `FIRST` that counts its commands.
+fn moving() -> (Rig, Arc<AtomicU32>) {
+    let commands = Arc::new(AtomicU32::new(0));
+    let count = Arc::clone(&commands);
+    let mover = Handlers::new(list_manager::LATEST)
+        .command(move |_: DeleteElement, _, _| _ = count.fetch_add(1, Relaxed))
+        .on_stop(|_| {});
+    let rig = Rig::new(vec![Box::new(mover)], |stack| {
+        stack.management(Management::new())
+    });
+    (rig.drive(), commands)
+}
+
+#[test]
+fn a_new_incarnation_counts_its_messages_anew() {
+    let (mut rig, commands) = moving();
+    let hear = |rig: &mut Rig, message: bytes::Bytes, sequence: u16| {
+        let message = Received {
+            source: FIRST,
+            destination: US,
+            to: US,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message,
+            sequence: Some(sequence),
+            path: None,
+        };
+        rig.stack.handle_message(rig.now, &message);
+        rig.said();
+    };
+    let command = DeleteElement::default().encode().unwrap();
+    hear(&mut rig, command.clone(), 499);
+    hear(&mut rig, Standby.encode().unwrap(), 500);
+    rig.introduce(FIRST, NEW);
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    hear(&mut rig, command, 1);
+    assert_eq!(commands.load(Relaxed), 2);
 }
