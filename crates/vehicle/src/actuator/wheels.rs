@@ -240,7 +240,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::actuator::{FaultSwitch, MotorConfig, SimulatedMotor};
+    use crate::actuator::{FaultSwitch, MotorConfig, SimulatedMotor, SimulatedServo};
     use crate::motion::{Frame, Goal, Pilot};
 
     fn rover() -> (Pilot, Odometer) {
@@ -352,23 +352,19 @@ mod tests {
         }
     }
 
-    #[test]
-    fn motion_without_a_command_is_a_fault_that_stops_both_sides() {
-        for (fault, says) in [
-            (|it: &FaultSwitch| it.stick(0.5), "without a command"),
-            (|it: &FaultSwitch| it.multiply(-1.0), "the wrong way"),
-            (|it: &FaultSwitch| it.multiply(4.0), "faster than commanded"),
-        ] as [(fn(&FaultSwitch), &str); 3]
-        {
-            let [left, right] = [1, 2].map(|seed| {
-                SimulatedMotor::new(MotorConfig {
-                    seed,
-                    ..MotorConfig::default()
-                })
-            });
-            let switch = left.fault_switch();
+    /// Breaks a drive in different ways while the vehicle drives. Each is found; returns the travel of
+    /// both sides since then.
+    fn breaks<T: Drivetrain + 'static>(
+        make: impl Fn(Odometer) -> (Wheels<T>, FaultSwitch),
+    ) -> Vec<(f64, f64)> {
+        let faults: [(fn(&FaultSwitch), &str); 3] = [
+            (|it| it.stick(0.5), "without a command"),
+            (|it| it.multiply(-1.0), "the wrong way"),
+            (|it| it.multiply(4.0), "faster than commanded"),
+        ];
+        let travel_after = |(fault, says): (fn(&FaultSwitch), &str)| {
             let odometer = Odometer::new(7);
-            let wheels = Wheels::new(left, right, WheelsConfig::default(), odometer.clone());
+            let (wheels, switch) = make(odometer.clone());
             let mut pilot = Pilot::new(wheels, Frame::default());
             let start = Instant::now();
             pilot.handle_time(start);
@@ -385,8 +381,49 @@ mod tests {
             let before = odometer.count();
             run(&mut pilot, now, 0.5);
             let after = odometer.count();
-            assert!((after.right - before.right).abs() < 1e-3, "{says}");
+            (after.left - before.left, after.right - before.right)
+        };
+        faults.into_iter().map(travel_after).collect()
+    }
+
+    fn motor(seed: u64) -> SimulatedMotor {
+        SimulatedMotor::new(MotorConfig {
+            seed,
+            ..MotorConfig::default()
+        })
+    }
+
+    #[test]
+    fn motion_without_a_command_of_either_side_is_a_fault_that_stops_the_other() {
+        for left_breaks in [true, false] {
+            let travel = breaks(|odometer| {
+                let (left, right) = (motor(1), motor(2));
+                let switch = match left_breaks {
+                    true => left.fault_switch(),
+                    false => right.fault_switch(),
+                };
+                let config = WheelsConfig::default();
+                (Wheels::new(left, right, config, odometer), switch)
+            });
+            for (left, right) in travel {
+                let other = if left_breaks { right } else { left };
+                assert!(other.abs() < 1e-3, "{other} m");
+            }
         }
+    }
+
+    #[test]
+    fn motion_without_a_command_of_the_only_drive_is_a_fault() {
+        let found = breaks(|odometer| {
+            let drive = motor(1);
+            let switch = drive.fault_switch();
+            let servo = SimulatedServo::new(SimulatedServo::RATE);
+            let geometry = Ackermann::default();
+            let config = WheelsConfig::default();
+            let wheels = Wheels::steered(drive, servo, config, geometry, odometer);
+            (wheels, switch)
+        });
+        assert_eq!(found.len(), 3);
     }
 
     #[test]

@@ -309,6 +309,17 @@ fn a_mission_that_waits_can_be_stopped_and_replaced() {
 }
 
 #[test]
+fn a_mission_that_waits_keeps_its_first_reason_and_its_attempt() {
+    let mut world = by_default();
+    world.set_back("no pose");
+    let run = world.run();
+    world.mission.handle_setback(world.now, run, "later");
+    world.pass(60 * SECOND);
+    assert_eq!((world.stage(), world.reason()), (Stage::Waiting, "no pose"));
+    assert_eq!(world.run(), run);
+}
+
+#[test]
 fn a_stage_that_is_blocked_for_a_moment_only_goes_on() {
     let mut world = World::under_way(true);
     world.drive();

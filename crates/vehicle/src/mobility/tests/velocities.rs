@@ -84,12 +84,15 @@ fn limits_end_with_the_control_of_the_client_that_set_them() {
         };
         limit.set_acceleration_x_m_per_s2(0.1).unwrap();
         rig.send(CLIENT, &limit);
+        let default = CommandType::SET_DEFAULT_COMMAND;
+        rig.send(CLIENT, &velocity(default, 1.0, 0.5));
         let ahead = velocity(CommandType::SET_CURRENT_COMMAND, 1.0, 0.0);
         rig.send(CLIENT, &ahead);
         rig.run(seconds(1.0));
         let why = vehicle.held().unwrap();
         assert!(why.starts_with("any motion is limited to 0"), "{why}");
         rig.stand(State::Standby, next);
+        assert!(told(&mut rig, default).0.abs() < 1e-3, "the default, too");
         rig.stand(State::Ready, Some(STRANGER));
         assert!((told(&mut rig, greatest).0 - 2.0).abs() < 1e-3);
         for _ in 0..30 {

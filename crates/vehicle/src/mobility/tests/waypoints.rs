@@ -7,8 +7,8 @@ use jaus::messages::mobility::set_travel_speed_ext::{
 use jaus::messages::mobility::{
     QueryGlobalWaypoint, QueryLocalWaypoint, QueryLocalWaypointExt, QueryTravelSpeed,
     QueryTravelSpeedExt, ReportGlobalWaypoint, ReportLocalWaypoint, ReportLocalWaypointExt,
-    ReportTravelSpeed, ReportTravelSpeedExt, SetGlobalWaypoint, SetLocalPose, SetLocalWaypointExt,
-    SetTravelSpeed, SetTravelSpeedExt, SetWrenchEffort,
+    ReportTravelSpeed, ReportTravelSpeedExt, SetGlobalPose, SetGlobalWaypoint, SetLocalPose,
+    SetLocalWaypointExt, SetTravelSpeed, SetTravelSpeedExt, SetWrenchEffort,
 };
 
 const QUERY: QueryLocalWaypoint = QueryLocalWaypoint::all();
@@ -233,6 +233,27 @@ fn a_local_waypoint_is_given_up_when_the_pose_is_set_elsewhere_on_the_way() {
     rig.send(CLIENT, &pose);
     rig.run(seconds(3.0));
     assert!(vehicle.motion().velocity.is_rest() && !vehicle.has_arrived());
+}
+
+#[test]
+fn a_global_waypoint_is_given_up_when_the_pose_on_the_globe_is_set_elsewhere_on_the_way() {
+    for (degrees, goes_on) in [(0.000_001, true), (0.000_05, false)] {
+        let (mut rig, vehicle) = rig();
+        let mut waypoint = SetGlobalWaypoint::default();
+        waypoint.set_latitude_deg(FRAME.0 + 0.001).unwrap();
+        waypoint.set_longitude_deg(FRAME.1).unwrap();
+        rig.send(CLIENT, &waypoint);
+        rig.send(CLIENT, &speed(2.0));
+        rig.run(seconds(5.0));
+        let here = vehicle.global_pose();
+        let mut pose = SetGlobalPose::default();
+        pose.set_latitude_deg(here.latitude).unwrap();
+        pose.set_longitude_deg(here.longitude + degrees).unwrap();
+        rig.send(CLIENT, &pose);
+        rig.run(seconds(3.0));
+        assert_eq!(!vehicle.motion().velocity.is_rest(), goes_on, "{degrees}");
+        assert!(!vehicle.has_arrived());
+    }
 }
 
 #[test]
