@@ -35,14 +35,14 @@ use crate::mission::zones::{keep_out, square};
 use crate::scene::{PLANNER, POSE, PRIMITIVE, STORE, Scene, VECTOR};
 use crate::whole_vehicle::WholeVehicle;
 
-/// Another client in the network, of the lowest authority.
-struct Stranger {
+/// Another client in the network.
+pub(crate) struct Stranger {
     _node: Node,
-    client: Component,
+    pub(crate) client: Component,
 }
 
 impl Stranger {
-    fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let node = Node::start(Config::loopback(77, 1).group(scene.group)).unwrap();
         let client = Component::builder(Kind::OperatorControlUnit, "Stranger");
         let client = client.attach(&node, 1).unwrap();
@@ -52,7 +52,8 @@ impl Stranger {
         }
     }
 
-    /// Takes control of a component that nobody controls, and sends it a command.
+    /// Takes control of a component that nobody controls, with the lowest authority, and sends it a
+    /// command.
     async fn command(&self, id: JausId, command: &impl Message) {
         let control = self.client.control(id, 1).await.unwrap();
         control.deliver(command).await.unwrap();
@@ -61,7 +62,7 @@ impl Stranger {
     }
 }
 
-fn pose(x: f64, y: f64, yaw: f64) -> SetLocalPose {
+pub(crate) fn pose(x: f64, y: f64, yaw: f64) -> SetLocalPose {
     let mut pose = SetLocalPose::default();
     pose.set_x_m(x).unwrap();
     pose.set_y_m(y).unwrap();
@@ -69,12 +70,12 @@ fn pose(x: f64, y: f64, yaw: f64) -> SetLocalPose {
     pose
 }
 
-async fn mission(vehicle: &Scene) -> ReportMission {
+pub(crate) async fn mission(vehicle: &Scene) -> ReportMission {
     let report = vehicle.client.query(PLANNER, &QueryMission {}).await;
     report.unwrap_or_default()
 }
 
-async fn until_stage(vehicle: &Scene, stage: Stage) -> ReportMission {
+pub(crate) async fn until_stage(vehicle: &Scene, stage: Stage) -> ReportMission {
     let mut last = ReportMission::default();
     let start = now();
     while now() - start < LIMIT {
@@ -88,8 +89,14 @@ async fn until_stage(vehicle: &Scene, stage: Stage) -> ReportMission {
 }
 
 /// A vehicle on its mission.
-async fn driving(name: &str) -> (WholeVehicle, Control) {
+pub(crate) async fn driving(name: &str) -> (WholeVehicle, Control) {
     let vehicle = WholeVehicle::start(name, None);
+    let planner = set_out(&vehicle).await;
+    (vehicle, planner)
+}
+
+/// Sends a vehicle from its start on a mission to (6, 5), and waits until it is under way.
+pub(crate) async fn set_out(vehicle: &WholeVehicle) -> Control {
     let planner = vehicle.control(PLANNER, mission_planner::URN).await;
     let go = SetDestination {
         x: 6.0,
@@ -98,12 +105,12 @@ async fn driving(name: &str) -> (WholeVehicle, Control) {
         approved: Approved::YES,
     };
     planner.deliver(&go).await.unwrap();
-    until_stage(&vehicle, Stage::DRIVING).await;
+    until_stage(vehicle, Stage::DRIVING).await;
     vehicle.until_at("sets out", |x, y| x.hypot(y) > 0.5).await;
-    (vehicle, planner)
+    planner
 }
 
-fn ahead(percent: f64) -> SetWrenchEffort {
+pub(crate) fn ahead(percent: f64) -> SetWrenchEffort {
     let mut effort = SetWrenchEffort::default();
     effort
         .set_propulsive_linear_effort_x_percent(percent)

@@ -1,6 +1,8 @@
 //! The reference vehicle: missions, sensors, the store under power cuts, faults, and hostile clients.
 
 mod beliefs;
+mod chain;
+mod gaps;
 mod inertial;
 mod mission;
 mod navigation;
