@@ -206,12 +206,10 @@ impl Stack {
     }
 
     fn pass_on(&mut self, publication: &Publication) -> Result<(), NotPublished> {
-        let (out, standing, life) = (&mut self.out, &self.standing, &self.life);
-        let (order, news) = (&mut self.order, &mut self.news);
-        let is_taken = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, life, order, news);
-            service.handle_publication(publication, &mut context) == Handled::Yes
-        });
+        let (services, mut context) = self.services_in_context();
+        let is_taken = services
+            .iter_mut()
+            .any(|service| service.handle_publication(publication, &mut context) == Handled::Yes);
         is_taken.then_some(()).ok_or_else(|| publication.refused())
     }
 
@@ -291,13 +289,23 @@ impl Stack {
     }
 
     fn handle_by_services(&mut self, now: Instant, message: &Received) -> Handled {
-        let (out, standing, life) = (&mut self.out, &self.standing, &self.life);
-        let (order, news) = (&mut self.order, &mut self.news);
-        let handled = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, life, order, news);
-            service.handle_message(now, message, &mut context) == Handled::Yes
-        });
+        let (services, mut context) = self.services_in_context();
+        let handled = services
+            .iter_mut()
+            .any(|service| service.handle_message(now, message, &mut context) == Handled::Yes);
         if handled { Handled::Yes } else { Handled::No }
+    }
+
+    /// The services, and the context in which to call them.
+    fn services_in_context(&mut self) -> (&mut Vec<Box<dyn Service>>, Context<'_>) {
+        let context = Context::new(
+            &mut self.out,
+            &self.standing,
+            &self.life,
+            &mut self.order,
+            &mut self.news,
+        );
+        (&mut self.services, context)
     }
 
     fn handle_event_request(&mut self, now: Instant, message: &Received) -> Handled {
@@ -427,16 +435,10 @@ impl Stack {
             let offers = service.offers();
             offers.iter().any(|id| id.urn == urn)
         };
-        let withdrawn: Vec<_> = self.services.extract_if(.., is_meant).collect();
-        let is_any = !withdrawn.is_empty();
-        for mut service in withdrawn {
-            let mut context = Context::new(
-                &mut self.out,
-                &self.standing,
-                &self.life,
-                &mut self.order,
-                &mut self.news,
-            );
+        let (services, mut context) = self.services_in_context();
+        let mut is_any = false;
+        for mut service in services.extract_if(.., is_meant) {
+            is_any = true;
             service.handle_stop(&StopCause::Ended, &mut context);
         }
         self.publish_offers(now);
@@ -496,14 +498,8 @@ impl Stack {
         self.discovery.handle_timeout(now, &mut self.out);
         self.probe(now);
         self.subscribers.expire(now, &mut self.out);
-        for service in &mut self.services {
-            let mut context = Context::new(
-                &mut self.out,
-                &self.standing,
-                &self.life,
-                &mut self.order,
-                &mut self.news,
-            );
+        let (services, mut context) = self.services_in_context();
+        for service in services {
             service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
@@ -562,14 +558,8 @@ impl Stack {
         if let Some(cause) = StopCause::of(&before, &after) {
             self.stop(&cause);
         }
-        for service in &mut self.services {
-            let mut context = Context::new(
-                &mut self.out,
-                &self.standing,
-                &self.life,
-                &mut self.order,
-                &mut self.news,
-            );
+        let (services, mut context) = self.services_in_context();
+        for service in services {
             service.handle_standing(now, &before, &mut context);
         }
         self.events.push_back(Event::Standing(after));

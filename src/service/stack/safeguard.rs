@@ -8,7 +8,7 @@ use super::Stack;
 use crate::service::control::Condition;
 use crate::service::life::Rank;
 use crate::service::safety;
-use crate::service::{Context, Incarnation, Service, StopCause, UnsafeService};
+use crate::service::{Incarnation, Service, StopCause, UnsafeService};
 
 /// What keeps the component in failure.
 #[derive(Debug, Default)]
@@ -65,14 +65,8 @@ impl Stack {
 
     /// Stops everything that the services move.
     pub fn stop(&mut self, cause: &StopCause) {
-        for service in &mut self.services {
-            let mut context = Context::new(
-                &mut self.out,
-                &self.standing,
-                &self.life,
-                &mut self.order,
-                &mut self.news,
-            );
+        let (services, mut context) = self.services_in_context();
+        for service in services {
             service.handle_stop(cause, &mut context);
         }
     }
@@ -211,14 +205,8 @@ impl Stack {
 impl Drop for Stack {
     /// However a component ends, including by a panic in one of its functions, its motion stops.
     fn drop(&mut self) {
-        for service in &mut self.services {
-            let mut context = Context::new(
-                &mut self.out,
-                &self.standing,
-                &self.life,
-                &mut self.order,
-                &mut self.news,
-            );
+        let (services, mut context) = self.services_in_context();
+        for service in services {
             // A panic in one stop action must not skip the next ones, nor may a panic during a
             // panic end the process before the last one.
             let stop = || service.handle_stop(&StopCause::Ended, &mut context);
