@@ -13,7 +13,8 @@
 //! A probe is Query Heartbeat Pulse, or Query Incarnation for a peer that offers [`Incarnation`].
 //! The client in control of a ready component is asked for its incarnation every
 //! [`Life::CHECK`] even if it is not silent: another number than before is a restart, however fast
-//! it was.
+//! it was. One without that service is sent Query Heartbeat Pulse instead whenever it has sent
+//! nothing for [`Life::NUMBER_CHECK`], if it numbers its messages: the numbers show a restart.
 //!
 //! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
 //! answered a probe with a message, because a node also acknowledges for a component that hangs.
@@ -21,12 +22,12 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
-
 use super::discovery::Budget;
+use super::restart_watch::{RestartWatch, Sameness};
 use super::{Incarnation, Outbox, code_of};
 use crate::address::JausId;
 use crate::codec::Message;
+use crate::endpoint::Received;
 use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse, ReportIncarnation};
 use crate::wire::Priority;
 
@@ -63,10 +64,14 @@ pub struct Life {
 
 #[derive(Debug)]
 struct Peer {
-    /// Its incarnation, if it has told it.
-    incarnation: Option<Incarnation>,
-    /// When it was last asked for its incarnation.
+    /// Whether it is still the same.
+    watch: RestartWatch,
+    /// When it was last asked whether it is still the same.
     asked: Option<Instant>,
+    /// Whether its next answer will show whether it is.
+    is_doubtful: bool,
+    /// How often it was asked since its last answer.
+    unanswered: u32,
     /// Time of the last sign of life.
     alive: Instant,
     /// Whether it has ever answered a probe with a message, and whether it acknowledges probes.
@@ -109,6 +114,11 @@ impl Life {
     /// Interval of queries for the incarnation of a client in control of a ready component. One
     /// lost answer must not delay the detection of a restart beyond 0.5 s.
     pub const CHECK: Duration = Duration::from_millis(200);
+    /// A client in control of a ready component that tells no incarnation is asked when it has sent
+    /// nothing for this time. Two of its messages show a restart.
+    pub const NUMBER_CHECK: Duration = Duration::from_millis(100);
+    /// It is no longer asked after this many queries without an answer.
+    const UNANSWERED: u32 = 10;
     /// A peer that answers probes and has been silent for this time is dead.
     pub const DEATH: Duration = Duration::from_secs(4);
     /// Budget for probes to subscribers, and another for those to setters of emergencies: a burst
@@ -133,8 +143,10 @@ impl Life {
         let peer = self.peers.entry(id).or_insert_with(|| {
             self.due.insert((now + rank.patience(), id));
             Peer {
-                incarnation: announced.map(|(_, _, incarnation)| incarnation),
+                watch: RestartWatch::of(announced.map(|(_, _, incarnation)| incarnation)),
                 asked: None,
+                is_doubtful: false,
+                unanswered: 0,
                 alive: now,
                 answers: false,
                 acknowledges: false,
@@ -154,27 +166,29 @@ impl Life {
     }
 
     /// Notes a message from a peer.
-    pub fn hear(&mut self, now: Instant, id: JausId, payload: &Bytes) {
-        let told = Incarnation::told_in(payload);
+    pub fn hear(&mut self, now: Instant, message: &Received) {
+        let (id, payload) = (message.source, &message.payload);
         let Some(peer) = self.peers.get_mut(&id) else {
-            if let Some(incarnation) = told {
+            if let Some(incarnation) = Incarnation::told_in(payload) {
                 self.announced = Some((now, id, incarnation));
             }
             return;
         };
         peer.alive = now;
         peer.probes = 0;
-        peer.answers |= matches!(
-            code_of(payload),
-            Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE)
-        );
-        if let Some(incarnation) = told
-            && peer
-                .incarnation
-                .replace(incarnation)
-                .is_some_and(|it| it != incarnation)
-        {
-            self.restarted.push_back(id);
+        if let Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE) = code_of(payload) {
+            (peer.answers, peer.unanswered) = (true, 0);
+        }
+        match peer.watch.note(now, message) {
+            Sameness::Same => {}
+            Sameness::Doubtful => {
+                // Its next answer decides, so it is asked at once.
+                peer.is_doubtful = true;
+                self.due.remove(&(peer.look, id));
+                peer.look = now;
+                self.due.insert((now, id));
+            }
+            Sameness::Restarted => self.restarted.push_back(id),
         }
     }
 
@@ -185,7 +199,7 @@ impl Life {
             return;
         };
         let is_due = peer.asked.is_none_or(|asked| now >= asked + Self::CHECK);
-        if peer.incarnation.is_none() && is_due {
+        if peer.watch.incarnation().is_none() && is_due {
             peer.asked = Some(now);
             out.send_with(id, Priority::High, &self.own.query());
         }
@@ -218,7 +232,8 @@ impl Life {
         peer.is_some_and(|peer| !peer.answers && !peer.acknowledges) && !self.is_alive(now, id)
     }
 
-    /// Probes silent peers, and asks controllers for their incarnation. `rank` returns why a peer is still watched; `None` ends the watch.
+    /// Probes silent peers, and asks controllers whether they are still the same. `rank` returns why
+    /// a peer is still watched; `None` ends the watch.
     pub fn handle_timeout(
         &mut self,
         now: Instant,
@@ -242,15 +257,19 @@ impl Life {
                         Rank::Controller | Rank::ReadyController | Rank::MovingController => true,
                     };
                     if !is_due && peer.is_to_be_checked(now, rank) {
-                        peer.asked = Some(now);
-                        out.send_with(id, Priority::High, &self.own.query());
+                        (peer.asked, peer.is_doubtful) = (Some(now), false);
+                        peer.unanswered = peer.unanswered.saturating_add(1);
+                        match peer.watch.incarnation() {
+                            Some(_) => out.send_with(id, Priority::High, &self.own.query()),
+                            None => out.send_with(id, Priority::High, &QueryHeartbeatPulse {}),
+                        }
                     } else if is_due && has_budget {
                         peer.is_known = true;
                         peer.probes = peer
                             .probes
                             .saturating_add(u32::from(silence >= rank.patience()));
-                        if peer.incarnation.is_some() {
-                            peer.asked = Some(now);
+                        (peer.asked, peer.is_doubtful) = (Some(now), false);
+                        if peer.watch.incarnation().is_some() {
                             out.send_acknowledged(id, Priority::High, &self.own.query());
                         } else {
                             out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
@@ -304,10 +323,21 @@ impl Peer {
         (self.answers || self.acknowledges) && self.probes >= 2
     }
 
-    /// When it is to be asked for its incarnation, although it may not be silent.
+    /// When it is to be asked whether it is still the same, although it may not be silent.
     fn next_check(&self, now: Instant, rank: Rank) -> Option<Instant> {
-        self.incarnation.filter(|_| rank.is_checked())?;
-        Some(self.asked.map_or(now, |asked| asked + Life::CHECK))
+        if !rank.is_checked() {
+            return None;
+        }
+        if self.watch.incarnation().is_some() {
+            return Some(self.asked.map_or(now, |asked| asked + Life::CHECK));
+        }
+        // Whatever it sends has a number.
+        let last = self.asked.map_or(self.alive, |asked| asked.max(self.alive));
+        let is_asked = self.watch.is_counting() && self.unanswered < Life::UNANSWERED;
+        is_asked.then(|| match self.is_doubtful {
+            true => now,
+            false => last + Life::NUMBER_CHECK,
+        })
     }
 
     fn is_to_be_checked(&self, now: Instant, rank: Rank) -> bool {
@@ -337,16 +367,28 @@ impl Peer {
     reason = "virtual time starts at any instant"
 )]
 mod tests {
+    use bytes::Bytes;
+
     use super::*;
     use crate::messages::core::QueryStatus;
+    use crate::wire::Broadcast;
 
     const US: JausId = JausId::new(101, 1, 1);
     const CLIENT: JausId = JausId::new(102, 1, 2);
     const STEP: Duration = Duration::from_millis(50);
 
-    /// The octets of a message without fields.
-    fn head(code: u16) -> Bytes {
-        Bytes::copy_from_slice(&code.to_le_bytes())
+    /// A message without fields from the client.
+    fn head(code: u16) -> Received {
+        Received {
+            source: CLIENT,
+            destination: US,
+            to: US,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            sequence: None,
+            payload: Bytes::copy_from_slice(&code.to_le_bytes()),
+            path: None,
+        }
     }
 
     /// What the client does; its node acknowledges in any case.
@@ -368,14 +410,14 @@ mod tests {
             *now += STEP;
             life.watch(*now, CLIENT, Rank::MovingController);
             if client != Client::Suspended {
-                life.hear(*now, CLIENT, &head(QueryStatus::CODE));
+                life.hear(*now, &head(QueryStatus::CODE));
             }
             life.handle_timeout(*now, |_| Some(Rank::MovingController), &mut out);
             while out.pop().is_some() {
                 probes += 1;
                 life.acknowledged(*now, CLIENT);
                 if client == Client::Lively {
-                    life.hear(*now, CLIENT, &head(ReportHeartbeatPulse::CODE));
+                    life.hear(*now, &head(ReportHeartbeatPulse::CODE));
                 }
             }
         }
@@ -457,7 +499,7 @@ mod tests {
         for (heard, next) in [(900, 1900), (100, 1200)] {
             let (mut life, start) = (Life::default(), Instant::now());
             life.watch(start, CLIENT, Rank::Controller);
-            life.hear(start + millis(heard), CLIENT, &Bytes::new());
+            life.hear(start + millis(heard), &head(QueryStatus::CODE));
             let due = start + Life::SILENCE;
             assert_eq!(
                 probes(&mut life, due, Rank::Controller),
@@ -473,14 +515,11 @@ mod tests {
         type Sign = fn(&mut Life, Instant);
         let signs: [(Sign, bool); 3] = [
             (
-                |life, now| life.hear(now, CLIENT, &head(ReportHeartbeatPulse::CODE)),
+                |life, now| life.hear(now, &head(ReportHeartbeatPulse::CODE)),
                 true,
             ),
             (|life, now| life.acknowledged(now, CLIENT), true),
-            (
-                |life, now| life.hear(now, CLIENT, &head(QueryStatus::CODE)),
-                false,
-            ),
+            (|life, now| life.hear(now, &head(QueryStatus::CODE)), false),
         ];
         for (sign, can_die) in signs {
             let (mut life, start) = (Life::default(), Instant::now());
@@ -510,7 +549,7 @@ mod tests {
     fn a_component_that_was_itself_held_up_probes_twice_before_a_peer_dies() {
         let (mut life, start) = (Life::default(), Instant::now());
         life.watch(start, CLIENT, Rank::Controller);
-        life.hear(start, CLIENT, &head(ReportHeartbeatPulse::CODE));
+        life.hear(start, &head(ReportHeartbeatPulse::CODE));
         for (at, sent) in [(60, 1), (61, 1), (62, 0)] {
             let now = start + at * Life::SILENCE;
             assert_eq!(life.poll_dead(), None);

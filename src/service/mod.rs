@@ -44,6 +44,7 @@ mod machines;
 mod order;
 mod outbox;
 mod publication;
+mod restart_watch;
 #[cfg(any(test, feature = "arbitrary"))]
 pub mod rig;
 mod safety;

@@ -76,10 +76,10 @@ pub(crate) fn is_stop(payload: &[u8]) -> bool {
 
 /// How far behind the newest number a late one may be: a client that sends 1000 messages a second
 /// and retransmits for 4 s uses this many.
-const REACH: u16 = 4096;
+pub(super) const REACH: u16 = 4096;
 /// How long a number counts. Our own nodes retransmit for 3 s, Junior for 0.4 s; a network adds its
 /// delay.
-const MEMORY: Duration = Duration::from_secs(4);
+pub(super) const MEMORY: Duration = Duration::from_secs(4);
 /// Limit of clients. In a component with Access Control one client at a time sends setpoints.
 const CLIENTS: usize = 64;
 
@@ -102,14 +102,19 @@ struct Client {
 
 /// A number, and when it arrived.
 #[derive(Debug, Clone, Copy)]
-struct Mark {
-    number: u16,
-    at: Instant,
+pub(super) struct Mark {
+    pub(super) number: u16,
+    pub(super) at: Instant,
 }
 
 impl Mark {
-    fn is_recent(self, now: Instant) -> bool {
+    pub(super) fn is_recent(self, now: Instant) -> bool {
         now.saturating_duration_since(self.at) < MEMORY
+    }
+
+    /// How far `number` is ahead, on the circle.
+    pub(super) const fn ahead(self, number: u16) -> u16 {
+        number.wrapping_sub(self.number)
     }
 
     /// How far `number` is behind, 0 if it is not or if this mark is too old to count.
@@ -136,10 +141,8 @@ impl Client {
 
     /// Whether the last stray setpoint was shortly before this number.
     fn agrees(&self, now: Instant, number: u16) -> bool {
-        self.stray.is_some_and(|stray| {
-            let ahead = number.wrapping_sub(stray.number);
-            stray.is_recent(now) && (1..=REACH).contains(&ahead)
-        })
+        self.stray
+            .is_some_and(|stray| stray.is_recent(now) && (1..=REACH).contains(&stray.ahead(number)))
     }
 }
 
@@ -205,7 +208,7 @@ impl SendOrder {
 }
 
 /// The number that the sender gave a message; `None` if it says nothing about the order.
-fn number_of(message: &Received) -> Option<u16> {
+pub(super) fn number_of(message: &Received) -> Option<u16> {
     let number = message.sequence?;
     message.destination.is_unicast().then_some(number)
 }

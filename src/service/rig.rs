@@ -8,6 +8,8 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
+
 use super::context::News;
 use super::life::{Life, Rank};
 use super::order::SendOrder;
@@ -97,16 +99,7 @@ impl Rig {
         source: JausId,
         message: &M,
     ) -> bool {
-        let received = Received {
-            source,
-            destination: self.out.source(),
-            priority: Priority::Standard,
-            broadcast: Broadcast::None,
-            payload: message.encode().unwrap(),
-            sequence,
-            path: None,
-            to: self.out.source(),
-        };
+        let received = self.received(sequence, source, message.encode().unwrap());
         self.services.iter_mut().any(|service| {
             let mut context = Context::new(
                 &mut self.out,
@@ -117,6 +110,19 @@ impl Rig {
             );
             service.handle_message(self.now, &received, &mut context) == Handled::Yes
         })
+    }
+
+    fn received(&self, sequence: Option<u16>, source: JausId, payload: Bytes) -> Received {
+        Received {
+            source,
+            destination: self.out.source(),
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload,
+            sequence,
+            path: None,
+            to: self.out.source(),
+        }
     }
 
     /// The answer to a query, if there is one.
@@ -169,7 +175,8 @@ impl Rig {
     fn wake(&mut self) {
         if self.client_lives {
             self.life.watch(self.now, CLIENT, Rank::Controller);
-            self.life.hear(self.now, CLIENT, &bytes::Bytes::new());
+            let sign = self.received(None, CLIENT, Bytes::new());
+            self.life.hear(self.now, &sign);
         }
         for service in &mut self.services {
             let mut context = Context::new(

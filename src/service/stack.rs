@@ -228,7 +228,7 @@ impl Stack {
     /// Handles a message to this component.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         self.end_overdue(now);
-        self.life.hear(now, message.source, &message.payload);
+        self.life.hear(now, message);
         self.end_control_of_restarted(now);
         self.discovery.hear(now, message);
         self.subscriptions.hear(now, message.source);

@@ -23,6 +23,8 @@ pub(crate) struct StackRig {
     pub(crate) now: Instant,
     /// Clients that no longer answer.
     pub(crate) dead: Vec<JausId>,
+    /// The next sequence number of the clients' messages; none if they come from the same node.
+    pub(crate) number: Option<u16>,
 }
 
 impl StackRig {
@@ -41,6 +43,7 @@ impl StackRig {
             stack: settings(Stack::new(discovery, services)),
             now: Instant::now(),
             dead: Vec::new(),
+            number: None,
         }
     }
 
@@ -63,9 +66,10 @@ impl StackRig {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
-            sequence: None,
+            sequence: self.number,
             path,
         };
+        self.number = self.number.map(|number| number.wrapping_add(1));
         self.stack.handle_message(self.now, &received);
         self.said()
     }

@@ -45,6 +45,9 @@ pub(crate) enum Fault {
     CutToController,
     /// The controller's process is killed, and another one with the same id sends its setpoints.
     Restarted,
+    /// The same with a controller of another product, which numbers its messages from 1 on each time
+    /// it starts, and tells no incarnation.
+    ForeignRestarted,
     /// A client with higher authority takes control.
     TakenOver,
     /// The controller releases control, but no release message arrives; then it is killed.
@@ -154,13 +157,14 @@ impl Driver {
 }
 
 impl Fault {
-    pub(crate) const ALL: [Self; 28] = [
+    pub(crate) const ALL: [Self; 29] = [
         Self::Killed,
         Self::Suspended,
         Self::CutOff,
         Self::CutToVehicle,
         Self::CutToController,
         Self::Restarted,
+        Self::ForeignRestarted,
         Self::TakenOver,
         Self::ReleaseLost,
         Self::Gateway,
@@ -209,7 +213,10 @@ impl Cell {
     /// no velocity command for the gateway to pass on.
     pub(crate) fn of_local_drivers() -> impl Iterator<Item = Self> {
         Self::all().filter(|cell| {
-            let is_special = matches!(cell.fault, Fault::ZoneSet | Fault::PoseJumps);
+            let is_special = matches!(
+                cell.fault,
+                Fault::ZoneSet | Fault::PoseJumps | Fault::ForeignRestarted
+            );
             let is_general = !cell.fault.is_of_receiver() && !is_special;
             let is_possible = cell.fault != Fault::Gateway || !cell.driver.is_velocity();
             is_general && is_possible && !cell.driver.is_global()
@@ -222,8 +229,14 @@ impl Cell {
         Self::all().filter(|cell| match cell.fault {
             Fault::ZoneSet => cell.driver != Driver::Own,
             Fault::PoseJumps => cell.driver.needs_pose(),
+            Fault::ForeignRestarted => false,
             fault => fault != Fault::Gateway && cell.driver.is_global(),
         })
+    }
+
+    /// All drivers with the restart of a controller of another product.
+    pub(crate) fn of_foreign_restarts() -> impl Iterator<Item = Self> {
+        Self::all().filter(|cell| cell.fault == Fault::ForeignRestarted)
     }
 
     fn all() -> impl Iterator<Item = Self> {
@@ -273,6 +286,7 @@ impl fmt::Display for Fault {
             Self::CutToVehicle => "cut off to the vehicle",
             Self::CutToController => "cut off to the controller",
             Self::Restarted => "controller restarted",
+            Self::ForeignRestarted => "foreign one restarted",
             Self::TakenOver => "taken over",
             Self::ReleaseLost => "release lost",
             Self::Gateway => "gateway restarted",

@@ -33,6 +33,8 @@ pub(crate) struct Client {
     queue: VecDeque<Bytes>,
     unacknowledged: Option<MessageHandle>,
     is_driving: bool,
+    /// Whether it is of another product: it knows nothing of incarnations.
+    is_foreign: bool,
     /// Whether the vehicle has ever reported ready.
     was_ready: bool,
     next: Instant,
@@ -72,10 +74,22 @@ impl Client {
             queue: VecDeque::new(),
             unacknowledged: None,
             is_driving: false,
+            is_foreign: false,
             was_ready: false,
             next: now,
             check: now,
         }
+    }
+
+    /// Makes it a client of another product.
+    pub(crate) fn foreign(mut self) -> Self {
+        self.is_foreign = true;
+        self
+    }
+
+    /// Whether it does not have this message.
+    fn lacks(&self, payload: &Bytes) -> bool {
+        self.is_foreign && commands::is_of_incarnation(payload)
     }
 
     /// Takes control and drives.
@@ -140,6 +154,7 @@ impl Client {
         event: EndpointEvent,
     ) {
         match event {
+            EndpointEvent::Received(message) if self.lacks(&message.payload) => {}
             EndpointEvent::Received(message) => self.stack.handle_message(now, &message),
             EndpointEvent::News(News::Acknowledged { message, .. })
                 if self.unacknowledged == Some(message) =>
@@ -179,6 +194,9 @@ impl Client {
             self.act(now, endpoint);
         }
         while let Some(message) = self.stack.poll_transmit() {
+            if self.lacks(&message.payload) {
+                continue;
+            }
             // There may be no route to the vehicle yet.
             let _ = endpoint.send(now, message);
         }

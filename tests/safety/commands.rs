@@ -6,7 +6,9 @@ use bytes::Bytes;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::set_time::TimeStamp;
-use jaus::messages::core::{SetElement, SetTime};
+use jaus::messages::core::{
+    QueryIncarnation, ReportIncarnation, ReportServiceList, ReportServices, SetElement, SetTime,
+};
 use jaus::messages::mobility::set_velocity_command::CommandType;
 use jaus::messages::mobility::{
     ExecuteList, ReportLocalPathSegment, SetGlobalVector, SetGlobalWaypoint, SetLocalPathSegment,
@@ -49,6 +51,19 @@ pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
         _ => return motion(driver),
     };
     vec![first, second, encode(&travel_speed())]
+}
+
+/// Whether a message tells or queries an incarnation, or lists the services of its sender, which
+/// would name that one.
+pub(crate) fn is_of_incarnation(payload: &Bytes) -> bool {
+    let code = payload.first_chunk().map(|it| u16::from_le_bytes(*it));
+    let codes = [
+        QueryIncarnation::CODE,
+        ReportIncarnation::CODE,
+        ReportServices::CODE,
+        ReportServiceList::CODE,
+    ];
+    code.is_some_and(|code| codes.contains(&code))
 }
 
 /// Set Time, from the sender's wall clock.

@@ -12,7 +12,7 @@
 //! | vector, and effort and velocity that are held | 2 s after the controller's last message |
 //! | waypoint, list, path segment | 5 s after the controller's last message |
 //! | any | 5 s after the last Request Control |
-//! | any, the controller restarted | 0.5 s after the new process is there |
+//! | any, the controller restarted (of another product: after 8 s at least) | 0.5 s after the new process is there |
 //! | any, its program hung | the actuator's deadline |
 //! | global vector and waypoint, no position | 2.5 s after the receiver's fault |
 //! | global vector and waypoint, a doubtful position | 0.5 s |
@@ -86,6 +86,24 @@ fn fresh_seeds_of_controllers_that_restart_stop() {
         "fresh_seeds_of_controllers_that_restart_stop",
         FRESH_SEEDS / 3,
         all.filter(|cell| cell.fault == Fault::Restarted).collect(),
+    );
+}
+
+#[test]
+fn every_cell_of_foreign_controllers_that_restart_stops() {
+    check_each(
+        "foreign controllers that restart",
+        "fresh_seeds_of_foreign_controllers_that_restart_stop",
+        Cell::of_foreign_restarts().collect(),
+    );
+}
+
+#[test]
+fn fresh_seeds_of_foreign_controllers_that_restart_stop() {
+    check_fresh_seeds(
+        "fresh_seeds_of_foreign_controllers_that_restart_stop",
+        FRESH_SEEDS / 3,
+        Cell::of_foreign_restarts().collect(),
     );
 }
 

@@ -103,6 +103,8 @@ impl Trial {
     const BRAKING_DISTANCE: f64 = 1.2;
     /// A controller that has restarted is noticed within this time.
     const RESTART: Duration = Duration::from_millis(500);
+    /// How long the numbers of its messages must be known for that, without an incarnation.
+    const NUMBERS: Duration = Duration::from_secs(9);
     /// Tolerance for the end of control after the vehicle notices its cause.
     const AT_ONCE: Duration = Duration::from_millis(100);
 
@@ -169,6 +171,9 @@ impl Trial {
             self.world
                 .with_operator(|_, operator| operator.note_motion());
         }
+        if self.cell.fault == Fault::ForeignRestarted {
+            self.world.run_for(Self::NUMBERS);
+        }
         self.run_between(0, 2000);
         self.outcome.moved = self.has_moved(0.2, 0.1);
         if !self.outcome.moved {
@@ -222,11 +227,13 @@ impl Trial {
             Fault::CutOff => self.cut(&[(controller, vehicle), (vehicle, controller)]),
             Fault::CutToVehicle => self.cut(&[(controller, vehicle)]),
             Fault::CutToController => self.cut(&[(vehicle, controller)]),
-            Fault::Restarted => {
+            Fault::Restarted | Fault::ForeignRestarted => {
                 self.world.network.kill(controller);
                 // Half of them faster than every limit on silence.
                 let longest = self.random.choose(&[150, 3000]);
                 self.run_between(1, longest);
+                // The times count from the start of the new process.
+                self.begin_fault();
                 self.world.restart_controller(self.insists);
                 self.sudden = Some(self.world.network.now() + Self::RESTART);
             }

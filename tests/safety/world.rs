@@ -187,24 +187,21 @@ impl World {
             vehicle(now, cell, &plant, clock, seed)
         });
         let scope = random.choose(&[Scope::System, Scope::Nobody]);
-        let client = |id, authority| {
-            Party::Client(Box::new(Client::new(
-                now,
-                id,
-                cell.driver,
-                authority,
-                scope,
-            )))
-        };
+        let client = |id, authority| Client::new(now, id, cell.driver, authority, scope);
+        let party = |client| Party::Client(Box::new(client));
         let controller = match cell.fault {
             Fault::Gateway => {
                 let crossing = Crossing::new(now, cell.driver);
                 let nobody = Endpoint::new(Config::default());
                 network.join(nobody, Party::Gateway(Box::new(crossing)))
             }
-            _ => network.join(endpoint(CONTROLLER), client(CONTROLLER, 100)),
+            Fault::ForeignRestarted => {
+                let foreign = client(CONTROLLER, 100).foreign();
+                network.join(endpoint(CONTROLLER), party(foreign))
+            }
+            _ => network.join(endpoint(CONTROLLER), party(client(CONTROLLER, 100))),
         };
-        let supervisor = network.join(endpoint(SUPERVISOR), client(SUPERVISOR, 200));
+        let supervisor = network.join(endpoint(SUPERVISOR), party(client(SUPERVISOR, 200)));
         let crowd = network.join(crowd(), Party::Crowd);
         for place in 0..random.below(4) {
             let id = JausId::new(110 + place as u16, 1, 1);
@@ -283,6 +280,9 @@ impl World {
     pub(crate) fn restart_controller(&mut self, insists: bool) {
         let now = self.network.now();
         let mut client = Client::new(now, CONTROLLER, self.cell.driver, 100, Scope::System);
+        if self.cell.fault == Fault::ForeignRestarted {
+            client = client.foreign();
+        }
         if insists {
             client.insist();
         }

@@ -11,7 +11,8 @@ use crate::messages::core::{
     ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
     ReportControl, ReportStatus, ReportTimeout, RequestControl,
 };
-use crate::service::{Handled, Incarnation, NoAnswer, Outbox, Patience, code_of, read};
+use crate::service::restart_watch::{RestartWatch, Sameness};
+use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
 
 /// Identifies one request for control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -101,8 +102,8 @@ struct Control {
     /// What the first requests are preceded by, so that the peer tells this client from an earlier
     /// incarnation.
     introduction: Introduction,
-    /// The peer's incarnation, if it has told it.
-    incarnation: Option<Incarnation>,
+    /// Whether the peer is still the same.
+    watch: RestartWatch,
     /// How long control lasts, once the peer has reported it. Zero means for ever.
     lifetime: Option<Duration>,
     /// How often the peer was asked for its lifetime.
@@ -167,7 +168,7 @@ impl Controls {
             patience,
             state: State::Asking,
             introduction,
-            incarnation: None,
+            watch: RestartWatch::default(),
             lifetime: None,
             lifetime_asked: 0,
             asked: 0,
@@ -261,16 +262,22 @@ impl Controls {
         Handled::Yes
     }
 
-    /// Handles the incarnation that a peer has told. Another one than before knows nothing of the
-    /// control that this client had.
-    pub(in crate::service) fn handle_incarnation(&mut self, peer: JausId, told: Incarnation) {
-        let Some(control) = self.all.get_mut(&peer) else {
+    /// Notes a message of a peer. One that has restarted knows nothing of the control that this
+    /// client had.
+    pub(in crate::service) fn watch_for_restart(&mut self, now: Instant, message: &Received) {
+        let Some(control) = self.all.get_mut(&message.source) else {
             return;
         };
-        let before = control.incarnation.replace(told);
-        if control.state == State::Held && before.is_some_and(|before| before != told) {
-            let news = control.lose(ControlLost::Restarted);
-            self.news.extend(news.map(|news| (control.id, news)));
+        match (control.watch.note(now, message), control.state) {
+            (Sameness::Restarted, State::Held) => {
+                let news = control.lose(ControlLost::Restarted);
+                self.news.extend(news.map(|news| (control.id, news)));
+            }
+            // Its next answer decides, so it is asked at once.
+            (Sameness::Doubtful, State::Held) => {
+                control.status.next = control.status.next.map(|_| now);
+            }
+            _ => {}
         }
     }
 
@@ -364,7 +371,7 @@ impl Control {
     fn request(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         let authority_code = self.authority;
         // Sent before the request: what an earlier incarnation of this client held ends first.
-        if self.incarnation.is_none()
+        if self.watch.incarnation().is_none()
             && let Some(query) = self.introduction.take()
         {
             out.send(peer, &query);

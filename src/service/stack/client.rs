@@ -9,9 +9,8 @@ use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::service::client::{Introduction, Sessions, Surroundings};
 use crate::service::{
-    Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Incarnation,
-    Inquiry, Patience, QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId,
-    Topic,
+    Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Inquiry, Patience,
+    QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
 };
 
 impl Stack {
@@ -170,9 +169,7 @@ impl Stack {
             ..
         } = self;
         sessions.handle_message(message);
-        if let Some(told) = Incarnation::told_in(&message.payload) {
-            controls.handle_incarnation(message.source, told);
-        }
+        controls.watch_for_restart(now, message);
         match subscriptions.handle_message(now, message, out) {
             Handled::Yes => Handled::Yes,
             Handled::No => controls.handle_message(now, message, out),

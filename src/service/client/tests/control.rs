@@ -458,3 +458,42 @@ fn control_is_lost_when_the_peer_is_another_incarnation() {
         [ControlNews::Lost(ControlLost::Restarted)]
     );
 }
+
+/// A peer without the service Incarnation answers the queries of its status for a while.
+fn report_status_for(bench: &mut Bench, duration: Duration) {
+    let end = bench.now + duration;
+    while bench.now < end {
+        bench.run_ms(10);
+        for (_, payload) in std::mem::take(&mut bench.sent) {
+            match code_of(&payload) {
+                Some(RequestControl::CODE) => bench.hear(PEER, &confirm(0)),
+                Some(QueryStatus::CODE) => bench.hear(PEER, &status(1)),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn control_is_lost_within_half_a_second_when_the_numbers_of_a_foreign_peer_begin_anew() {
+    let (mut bench, _) = held(5);
+    bench.number = Some(30);
+    report_status_for(&mut bench, Duration::from_secs(9));
+    assert_eq!(news(&mut bench), [ControlNews::Status(1)]);
+    // Its new process says that it is ready, too.
+    bench.number = Some(1);
+    report_status_for(&mut bench, Duration::from_millis(500));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::Restarted)]
+    );
+}
+
+#[test]
+fn control_is_kept_when_the_numbers_of_a_foreign_peer_wrap() {
+    let (mut bench, _) = held(5);
+    bench.number = Some(65_500);
+    report_status_for(&mut bench, Duration::from_secs(20));
+    assert!(bench.number.is_some_and(|number| number < 1000));
+    assert_eq!(news(&mut bench), [ControlNews::Status(1)]);
+}

@@ -26,6 +26,8 @@ struct Bench {
     stack: Stack,
     sent: Vec<(JausId, Bytes)>,
     events: Vec<Event>,
+    /// The next sequence number of the peers' messages; none if they are of the same node.
+    number: Option<u16>,
 }
 
 impl Bench {
@@ -46,6 +48,7 @@ impl Bench {
             stack: Stack::new(discovery, Vec::new()),
             sent: Vec::new(),
             events: Vec::new(),
+            number: None,
         };
         bench.stack.start(bench.now);
         bench.collect();
@@ -80,10 +83,11 @@ impl Bench {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload,
-            sequence: None,
+            sequence: self.number,
             path: None,
             to: CLIENT,
         };
+        self.number = self.number.map(|number| number.wrapping_add(1));
         self.stack.handle_message(self.now, &message);
         self.collect();
     }

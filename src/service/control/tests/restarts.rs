@@ -54,6 +54,67 @@ impl Rig {
         assert_eq!(rig.state(), State::Ready);
         rig
     }
+
+    /// A ready component that `FIRST` controls, which is of another product and has sent messages
+    /// with numbers from this one on for 9 s.
+    fn driven_by_foreign(first: u16) -> Self {
+        let mut rig = Self::managed();
+        rig.number = Some(first);
+        rig.request(FIRST, 100);
+        rig.hear(FIRST, &Resume);
+        rig.renew_for_9_s();
+        rig
+    }
+
+    fn renew_for_9_s(&mut self) {
+        for _ in 0..9 {
+            self.run(Duration::from_secs(1));
+            self.request(FIRST, 100);
+        }
+        assert_eq!(self.state(), State::Ready);
+    }
+}
+
+#[test]
+fn a_foreign_client_that_restarts_is_noticed_within_half_a_second_by_its_numbers() {
+    for first in [30, 20_000, 50_000] {
+        let mut rig = Rig::driven_by_foreign(first);
+        // The new process answers probes as the old one did, and does nothing else.
+        rig.number = Some(1);
+        rig.run(Duration::from_millis(500));
+        let now = (rig.state(), rig.controller());
+        assert_eq!(now, (State::Standby, None), "{first}");
+    }
+}
+
+#[test]
+fn a_foreign_client_whose_numbers_wrap_keeps_control() {
+    let mut rig = Rig::driven_by_foreign(65_500);
+    assert!(rig.number.is_some_and(|number| number < 1000), "it wrapped");
+    rig.renew_for_9_s();
+    assert_eq!(rig.controller(), Some((FIRST, 100)));
+}
+
+#[test]
+fn a_foreign_client_that_does_not_count_is_not_asked_all_the_time() {
+    for number in [None, Some(0)] {
+        let mut rig = Rig::managed();
+        let mut probes = 0;
+        rig.request(FIRST, 100);
+        rig.hear(FIRST, &Resume);
+        for _ in 0..40 {
+            rig.number = number;
+            rig.now += Duration::from_millis(100);
+            rig.stack.handle_timeout(rig.now);
+            while let Some(message) = rig.stack.poll_transmit() {
+                if QueryHeartbeatPulse::decode(&message.payload).is_ok() {
+                    probes += 1;
+                    rig.hear(FIRST, &ReportHeartbeatPulse {});
+                }
+            }
+        }
+        assert!(probes <= 5, "{probes} in 4 s");
+    }
 }
 
 #[test]

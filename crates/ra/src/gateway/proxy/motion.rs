@@ -37,7 +37,7 @@ impl Motion {
 
     /// Notes a message of a JAUS component.
     pub(super) fn hear(&mut self, now: Instant, message: &Received) {
-        self.life.hear(now, message.source, &message.payload);
+        self.life.hear(now, message);
     }
 
     /// Takes the next liveness probe.
