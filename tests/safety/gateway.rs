@@ -33,6 +33,8 @@ pub(crate) const OPERATOR_BEHIND_GATEWAY: JausId = JausId::new(42, 1, 32);
 pub(crate) struct Crossing {
     gateway: Gateway,
     operator: Operator,
+    /// When the gateway attached the operator.
+    pub(crate) attached: Option<Instant>,
 }
 
 /// The RA operator.
@@ -57,7 +59,11 @@ impl Crossing {
     fn with(now: Instant, operator: Operator) -> Self {
         let mut gateway = Gateway::new(GATEWAY, Settings::default()).expect("a subsystem of RA's");
         gateway.start(now);
-        Self { gateway, operator }
+        Self {
+            gateway,
+            operator,
+            attached: None,
+        }
     }
 
     /// Restarts a killed gateway; the operator keeps its state.
@@ -127,7 +133,12 @@ impl Crossing {
         while let Some(action) = self.gateway.poll_action() {
             moved = true;
             match action {
-                Action::Attach(id) => endpoint.attach(id).expect("each id once"),
+                Action::Attach(id) => {
+                    endpoint.attach(id).expect("each id once");
+                    if id == OPERATOR_BEHIND_GATEWAY {
+                        self.attached.get_or_insert(now);
+                    }
+                }
                 Action::Detach(id) => endpoint.detach(id),
                 Action::Send(message) => {
                     // The route to the receiver may be gone.

@@ -70,6 +70,8 @@ struct Trial {
     odometer: f64,
     /// When the fault itself must have stopped the vehicle, and ended control.
     sudden: Option<Instant>,
+    /// Whether the gateway was restarted.
+    is_gateway_back: bool,
     /// Whether the controller keeps repeating its setpoints after the fault.
     insists: bool,
     /// Whether the component is running and sound at the end.
@@ -120,6 +122,7 @@ impl Trial {
             world,
             odometer: 0.0,
             sudden: None,
+            is_gateway_back: false,
             is_sound: true,
             outcome: Outcome::default(),
         }
@@ -280,7 +283,8 @@ impl Trial {
         });
     }
 
-    /// The gateway is killed, and its operator survives. It may insist on its commands after the
+    /// The gateway is killed, and its operator survives. The vehicle notices when the operator is
+    /// attached again. It may insist on its commands after the
     /// gateway's restart, and request control after losing it. It does not send Resume.
     fn restart_gateway(&mut self) {
         self.world.network.kill(self.world.controller);
@@ -290,6 +294,7 @@ impl Trial {
         }
         self.world.witness().stop_counting();
         self.world.restart_gateway();
+        self.is_gateway_back = true;
         if self.insists {
             self.world.with_operator(|_, operator| operator.insist());
         }
@@ -487,6 +492,11 @@ impl Trial {
 
     fn watch(&mut self) {
         self.world.run_for(Self::WATCH);
+        if self.is_gateway_back
+            && let Some(attached) = self.world.operator_attached()
+        {
+            self.sudden = Some(attached + Self::RESTART);
+        }
     }
 
     /// Until when the vehicle may be ordered to move.

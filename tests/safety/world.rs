@@ -314,6 +314,14 @@ impl World {
         self.network.restart(self.controller, nobody, party);
     }
 
+    /// When the gateway, as it runs now, attached the operator.
+    pub(crate) fn operator_attached(&mut self) -> Option<Instant> {
+        match self.network.owner(self.controller) {
+            Party::Gateway(crossing) => crossing.attached,
+            _ => None,
+        }
+    }
+
     /// Sends one message each from `count` more ids of the crowd.
     pub(crate) fn let_crowd_come(&mut self, random: &mut Random, count: usize) {
         let ids: Vec<_> = crowd_ids().skip(self.crowd_size).take(count).collect();
