@@ -10,6 +10,7 @@ mod emergency;
 mod fleet;
 mod hold;
 mod lease;
+mod manual_drive;
 mod maps;
 mod mission;
 mod observations;

@@ -9,8 +9,8 @@ use tokio::sync::mpsc;
 
 use super::alarm::Alarm;
 use super::client::Client;
-use super::driving::ManualDrive;
 use super::lease::{Lease, Wanted};
+use super::manual_drive::ManualDrive;
 use super::maps::Maps;
 use crate::following::{Following, Sighting};
 use crate::handover::{Content, Handover};
