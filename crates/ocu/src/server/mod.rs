@@ -297,20 +297,13 @@ async fn serve_page(
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
-        return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
-    };
-    let seats = [&shared.places, &shared.strangers];
-    if let Err(words) = shared.seat(&visitor, &headers, seats).await {
-        return (StatusCode::SERVICE_UNAVAILABLE, words + "\n").into_response();
-    }
-    upgrade
-        .protocols([SUBPROTOCOL])
-        .max_message_size(bounds::LARGEST_FRAME)
-        .max_frame_size(bounds::LARGEST_FRAME)
-        .on_upgrade(async move |socket| {
+    let places = [&shared.places, &shared.strangers];
+    match shared.admit_socket(address, &headers, places).await {
+        Ok(visitor) => of_page(upgrade).on_upgrade(async move |socket| {
             socket::serve(socket, shared, visitor, introduction).await;
-        })
+        }),
+        Err(refusal) => refusal.into_response(),
+    }
 }
 
 async fn serve_stops(
@@ -319,20 +312,21 @@ async fn serve_stops(
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
-    let Some(visitor) = shared.admission.gate.visitor(&headers, address) else {
-        return (StatusCode::UNAUTHORIZED, "log in first\n").into_response();
-    };
-    let seats = [&shared.stop_places, &shared.stop_strangers];
-    if let Err(words) = shared.seat(&visitor, &headers, seats).await {
-        return (StatusCode::SERVICE_UNAVAILABLE, words + "\n").into_response();
+    let places = [&shared.stop_places, &shared.stop_strangers];
+    match shared.admit_socket(address, &headers, places).await {
+        Ok(visitor) => of_page(upgrade).on_upgrade(async move |socket| {
+            stop_socket::serve(socket, shared, visitor).await;
+        }),
+        Err(refusal) => refusal.into_response(),
     }
+}
+
+/// The upgrade to a WebSocket of a page.
+fn of_page(upgrade: WebSocketUpgrade) -> WebSocketUpgrade {
     upgrade
         .protocols([SUBPROTOCOL])
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
-        .on_upgrade(async move |socket| {
-            stop_socket::serve(socket, shared, visitor).await;
-        })
 }
 
 /// The subprotocol of a page's WebSocket. A browser sets no other header of a WebSocket, so a page
@@ -364,6 +358,25 @@ impl Shared {
         self.counters.wrong_tokens.fetch_add(1, Relaxed);
         sleep(WRONG_TOKEN).await;
         false
+    }
+
+    /// The visitor of a new WebSocket, who has taken a place.
+    ///
+    /// # Errors
+    /// If the visitor has not logged in, or there is no place.
+    async fn admit_socket(
+        &self,
+        address: SocketAddr,
+        headers: &HeaderMap,
+        places: [&Places; 2],
+    ) -> Result<Visitor, (StatusCode, String)> {
+        let gate = &self.admission.gate;
+        let stranger = || (StatusCode::UNAUTHORIZED, "log in first\n".to_owned());
+        let visitor = gate.visitor(headers, address).ok_or_else(stranger)?;
+        match self.seat(&visitor, headers, places).await {
+            Ok(()) => Ok(visitor),
+            Err(why) => Err((StatusCode::SERVICE_UNAVAILABLE, why + "\n")),
+        }
     }
 
     /// Takes a place for a new connection: one of a user or with the right token takes none of the pages
