@@ -57,9 +57,13 @@ struct Flags {
     rate: f64,
 
     /// Let ROS command the vehicle with this authority, from 0 to 255; the higher one wins
-    /// [default: no commands but emergency stops]
+    /// [default: no commands]
     #[arg(long, value_name = "AUTHORITY")]
     control: Option<u8>,
+
+    /// Let ROS set emergencies without --control, which includes this
+    #[arg(long)]
+    allow_emergency: bool,
 
     /// Let ROS clear the emergencies that it has set
     #[arg(long)]
@@ -170,6 +174,7 @@ impl Flags {
         });
         settings.rate_hz = self.rate;
         settings.control = self.control;
+        settings.allow_emergency = self.allow_emergency;
         settings.allow_clear = self.allow_clear;
         settings.drive.timeout = self.timeout;
         settings.drive.hold = self.hold;

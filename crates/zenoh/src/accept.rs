@@ -146,12 +146,13 @@ mod tests {
     const QUERY: &[u8] = b"\x04\x24\xFF\xFF";
     const RESUME: &[u8] = b"\x04\x00";
     const REQUEST_CONTROL: &[u8] = b"\x0D\x00\x64";
+    const SET_EMERGENCY: &[u8] = b"\x06\x00\x01\x00";
 
     #[test]
-    fn without_grants_everybody_may_observe_and_nobody_may_command() {
+    fn without_grants_everybody_may_observe_and_nobody_may_command_or_set_an_emergency() {
         let all = Acceptance::default();
         assert_eq!(all.check(&frame(OPERATOR, QUERY)), Ok(()));
-        for command in [RESUME, REQUEST_CONTROL] {
+        for command in [RESUME, REQUEST_CONTROL, SET_EMERGENCY] {
             let refused = all.check(&frame(OPERATOR, command));
             assert!(matches!(refused, Err(Unaccepted::Rule(_))), "{refused:?}");
         }
@@ -163,6 +164,7 @@ mod tests {
         assert_eq!(some.check(&frame(OPERATOR, REQUEST_CONTROL)), Ok(()));
         let colleague = JausId::new(60, 2, 1);
         assert_eq!(some.check(&frame(colleague, QUERY)), Ok(()));
+        assert_eq!(some.check(&frame(colleague, SET_EMERGENCY)), Ok(()));
         let refused = some.check(&frame(colleague, REQUEST_CONTROL));
         assert_eq!(refused, Err(Unaccepted::Rule(Refusal::Control)));
         let stranger = JausId::new(61, 1, 1);

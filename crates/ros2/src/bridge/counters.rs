@@ -15,6 +15,7 @@ jaus::counters! {
     Goals = "goals received",
     GoalRefused = "goals refused",
     Emergencies = "emergency stops received",
+    EmergencyRefused = "emergency stops refused (--allow-emergency)",
     ClearRefused = "ends of emergencies refused (--allow-clear)",
     Malformed = "messages of ROS that could not be read",
     NotTaken = "messages of ROS dropped because the bridge did not take them in time",

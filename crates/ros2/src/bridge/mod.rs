@@ -57,9 +57,10 @@ pub struct Settings {
     pub vehicle: Selection,
     /// The rate of poses, velocities, positions and further reports, in hertz.
     pub rate_hz: f64,
-    /// The authority with which control is requested, 0 to 255; `None` refuses all commands but
-    /// emergency stops.
+    /// The authority with which control is requested, 0 to 255; `None` refuses all commands.
     pub control: Option<u8>,
+    /// Whether ROS can set emergencies without `control`, which includes this.
+    pub allow_emergency: bool,
     /// Whether ROS can clear the emergencies that it has set.
     pub allow_clear: bool,
     /// Times and limits of driving.
@@ -71,13 +72,14 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Settings for a vehicle: read-only, 10 Hz, goals at 1 m/s, in the frame `map`.
+    /// Settings for a vehicle: read-only without emergencies, 10 Hz, goals at 1 m/s, in the frame `map`.
     #[must_use]
     pub fn new(vehicle: Selection) -> Self {
         Self {
             vehicle,
             rate_hz: 10.0,
             control: None,
+            allow_emergency: false,
             allow_clear: false,
             drive: DriveSettings::default(),
             goal_speed: 1.0,

@@ -215,6 +215,10 @@ impl Runner {
     }
 
     fn handle_emergency(&mut self, now: Instant, on: bool) {
+        if on && !self.settings.allow_emergency && self.settings.control.is_none() {
+            let why = "allow it with --allow-emergency or --control";
+            return self.refuse(Counter::EmergencyRefused, why);
+        }
         if on {
             self.counters.add(Counter::Emergencies);
             if !self.emergency.is_being_set() {

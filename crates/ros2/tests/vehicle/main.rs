@@ -87,7 +87,7 @@ async fn the_end_of_the_publisher_or_of_the_network_stops_the_vehicle_before_the
 }
 
 #[tokio::test(start_paused = true)]
-async fn without_control_nothing_is_commanded_but_an_emergency_stop_is() {
+async fn without_rights_nothing_is_commanded_and_no_emergency_set() {
     let mut scene = Scene::new();
     scene.start_vehicle();
     scene.start_bridge(None);
@@ -100,7 +100,20 @@ async fn without_control_nothing_is_commanded_but_an_emergency_stop_is() {
     assert_eq!(scene.controller().await, 0);
     scene.until(|it| it.says("--control)=20")).await;
     scene.input(Input::EmergencyStop(true)).await;
-    scene.until(|it| it.says("emergency")).await;
+    scene.until(|it| it.says("--allow-emergency)=1")).await;
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    assert!(!scene.says(": emergency"), "{}", scene.status());
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_bridge_that_may_only_stop_sets_an_emergency() {
+    let mut scene = Scene::new();
+    scene.start_vehicle();
+    scene.start_bridge_with(|settings| settings.allow_emergency = true);
+    scene.until(|it| it.odometry().is_some()).await;
+    scene.input(Input::EmergencyStop(true)).await;
+    scene.until(|it| it.says("Driver: emergency")).await;
     scene.end().await;
 }
 
@@ -129,7 +142,7 @@ async fn an_emergency_stops_the_vehicle_and_it_drives_again_only_after_a_clear_a
 #[tokio::test(start_paused = true)]
 async fn an_emergency_stop_reaches_a_vehicle_that_appears_after_it() {
     let mut scene = Scene::new();
-    scene.start_bridge(None);
+    scene.start_bridge(Some(127));
     scene.input(Input::EmergencyStop(true)).await;
     tokio::time::sleep(Duration::from_secs(1)).await;
     scene.start_vehicle();

@@ -67,11 +67,16 @@ impl Scene {
 
     /// Starts a bridge with this authority.
     pub(crate) fn start_bridge(&mut self, authority: Option<u8>) {
+        self.start_bridge_with(|settings| settings.control = authority);
+    }
+
+    /// Starts a bridge with these rights.
+    pub(crate) fn start_bridge_with(&mut self, rights: impl FnOnce(&mut Settings)) {
         let mut settings = Settings::new(Selection {
             subsystem: 101,
             only: Vec::new(),
         });
-        settings.control = authority;
+        rights(&mut settings);
         settings.allow_clear = true;
         settings.rate_hz = 20.0;
         let node = self.node(JausId::new(101, 252, 1));
