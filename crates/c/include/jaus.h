@@ -101,6 +101,16 @@
 #define JAUS_CONDITION_SAFE 2
 
 /**
+ * The component stops by itself, as by a stop input: an emergency begins that no client can clear.
+ */
+#define JAUS_CONDITION_STOPPED 3
+
+/**
+ * The reason of `JAUS_CONDITION_STOPPED` is over: its emergency ends. Those that clients have set remain.
+ */
+#define JAUS_CONDITION_STOP_RELEASED 4
+
+/**
  * As the standard's commands need: 500 ms for efforts, velocities and commands of your own; vectors
  * while their client shows life; goals until they are reached.
  */

@@ -10,8 +10,9 @@ use crate::argument::{check_out, message, put};
 use crate::component::{COMPONENTS, edit, running};
 use crate::status::{Failure, JausStatus, check_may_wait, run};
 use crate::types::{
-    JAUS_CONDITION_FAILED, JAUS_CONDITION_INITIALIZED, JAUS_CONDITION_SAFE, JausAddress,
-    JausComponent, JausEvent, JausEventCallback,
+    JAUS_CONDITION_FAILED, JAUS_CONDITION_INITIALIZED, JAUS_CONDITION_SAFE,
+    JAUS_CONDITION_STOP_RELEASED, JAUS_CONDITION_STOPPED, JausAddress, JausComponent, JausEvent,
+    JausEventCallback,
 };
 
 /// Reports each change of the component's own state and of its controller: `JausEventKind_Standing`.
@@ -204,9 +205,11 @@ pub extern "C" fn jaus_component_set_condition(
             JAUS_CONDITION_INITIALIZED => Condition::Initialized,
             JAUS_CONDITION_FAILED => Condition::Failed,
             JAUS_CONDITION_SAFE => Condition::Safe,
+            JAUS_CONDITION_STOPPED => Condition::Stopped,
+            JAUS_CONDITION_STOP_RELEASED => Condition::StopReleased,
             other => {
                 return Err(Failure::argument(format!(
-                    "condition {other}: choose 0 to 2"
+                    "condition {other}: choose 0 to 4"
                 )));
             }
         };

@@ -70,6 +70,10 @@ pub const JAUS_CONDITION_INITIALIZED: u8 = 0;
 pub const JAUS_CONDITION_FAILED: u8 = 1;
 /// The person responsible on site has checked the vehicle: all emergencies end.
 pub const JAUS_CONDITION_SAFE: u8 = 2;
+/// The component stops by itself, as by a stop input: an emergency begins that no client can clear.
+pub const JAUS_CONDITION_STOPPED: u8 = 3;
+/// The reason of `JAUS_CONDITION_STOPPED` is over: its emergency ends. Those that clients have set remain.
+pub const JAUS_CONDITION_STOP_RELEASED: u8 = 4;
 
 /// As the standard's commands need: 500 ms for efforts, velocities and commands of your own; vectors
 /// while their client shows life; goals until they are reached.

@@ -80,6 +80,29 @@ async def test_an_emergency_stops_a_driver(node: jaus.Node, operator: jaus.Compo
             await operator.clear_emergency(driver.id)
 
 
+async def test_a_pressed_stop_ends_only_by_its_release_and_leaves_the_emergencies_of_clients(
+    node: jaus.Node, operator: jaus.Component
+) -> None:
+    motor = Motor()
+    async with driver_of(node, motor, validity="until-done") as driver:
+        async with operator.control(driver.id) as control:
+            await control.resume()
+            control.send(set_effort(30))
+            await until(lambda: motor.effort != 0)
+            driver.press_stop()
+            await until(lambda: motor.effort == 0)
+            await until(lambda: driver.standing.state is jaus.State.EMERGENCY)
+            await operator.set_emergency(driver.id)
+            await operator.clear_emergency(driver.id)
+            assert driver.standing.state is jaus.State.EMERGENCY
+            await operator.set_emergency(driver.id)
+            driver.release_stop()
+            await asyncio.sleep(0.2)
+            assert driver.standing.state is jaus.State.EMERGENCY
+            await operator.clear_emergency(driver.id)
+            await until(lambda: driver.standing.state is not jaus.State.EMERGENCY)
+
+
 async def test_a_command_handler_that_raises_stops_the_component_until_it_recovers(
     node: jaus.Node, operator: jaus.Component, caplog: pytest.LogCaptureFixture
 ) -> None:

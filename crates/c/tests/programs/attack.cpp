@@ -333,7 +333,7 @@ void lengths_and_numbers_that_make_no_sense_are_errors() {
     require(jaus_component_send(client.get(), peer, 4, query.data(), query.size()) ==
                 JausStatus_InvalidArgument,
             "a priority");
-    require(jaus_component_set_condition(client.get(), 3) == JausStatus_InvalidArgument,
+    require(jaus_component_set_condition(client.get(), 5) == JausStatus_InvalidArgument,
             "a condition");
 }
 

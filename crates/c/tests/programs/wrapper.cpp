@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <future>
 #include <iostream>
+#include <thread>
 
 namespace {
 
@@ -193,6 +194,23 @@ void functions_that_are_missing_are_errors_or_make_events() {
     require(component.next_event(jaus::Milliseconds(10000)).has_value(), "an event in time");
 }
 
+void a_pressed_stop_is_an_emergency_until_it_is_released() {
+    jaus::Node node = loopback(101);
+    jaus::Component driver(node, 33, JAUS_KIND_VEHICLE, "Rover");
+    driver.management().start();
+    const auto reaches = [&](std::uint8_t state) {
+        for (int tries = 0; tries < 1000 && driver.standing().first != state; ++tries) {
+            std::this_thread::sleep_for(jaus::Milliseconds(10));
+        }
+        return driver.standing().first == state;
+    };
+    const auto before = driver.standing().first;
+    driver.set_condition(JAUS_CONDITION_STOPPED);
+    require(reaches(JAUS_STATE_EMERGENCY), "stopped");
+    driver.set_condition(JAUS_CONDITION_STOP_RELEASED);
+    require(reaches(before), "released");
+}
+
 void time_limits_that_are_too_long_are_the_longest() {
     using jaus::detail::milliseconds;
     require(milliseconds<std::uint32_t>(std::chrono::hours(1200)) == UINT32_MAX, "too long");
@@ -208,6 +226,7 @@ int main() {
     functions_that_are_missing_are_errors_or_make_events();
     time_limits_that_are_too_long_are_the_longest();
     errors_are_thrown();
+    a_pressed_stop_is_an_emergency_until_it_is_released();
     an_unsafe_driver_does_not_start();
     a_callback_answers_and_may_not_wait();
     handlers_live_as_long_as_the_library_may_call_them();

@@ -295,6 +295,16 @@ class Component:
         """Reports that the component is ready for work: initialized, or repaired."""
         self._core.set_condition("initialized")
 
+    def press_stop(self) -> None:
+        """Stops the component, as a stop input does. An emergency begins that no client can clear, until
+        :meth:`release_stop`."""
+        self._core.stop()
+        self._core.set_condition("stopped")
+
+    def release_stop(self) -> None:
+        """Ends the emergency of :meth:`press_stop`. Emergencies that clients have set remain."""
+        self._core.set_condition("stop released")
+
     def declare_safe(self) -> None:
         """Ends all emergencies. For the case that the person responsible on site has checked the vehicle."""
         self._core.set_condition("safe")

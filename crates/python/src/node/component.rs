@@ -240,15 +240,18 @@ impl Component {
         Ok(())
     }
 
-    /// Sets the condition: `"initialized"`, `"failed"` or `"safe"`.
+    /// Sets the condition: `"initialized"`, `"failed"`, `"stopped"`, `"stop released"` or `"safe"`.
     fn set_condition(&self, condition: &str) -> Result<(), Failure> {
         let condition = match condition {
             "initialized" => Condition::Initialized,
             "failed" => Condition::Failed,
+            "stopped" => Condition::Stopped,
+            "stop released" => Condition::StopReleased,
             "safe" => Condition::Safe,
             other => {
                 return Err(Failure::argument(format!(
-                    "condition {other:?}: choose \"initialized\", \"failed\" or \"safe\""
+                    "condition {other:?}: choose \"initialized\", \"failed\", \"stopped\", \"stop \
+                     released\" or \"safe\""
                 )));
             }
         };
