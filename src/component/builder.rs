@@ -1,7 +1,7 @@
 //! The builder of a component: settings, services, and attachment to a node.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU8;
+use std::sync::atomic::{AtomicU8, AtomicU64};
 
 use tokio::sync::{mpsc, watch};
 
@@ -194,11 +194,13 @@ impl Builder {
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
         let (directory, directories) = watch::channel(());
         let (standing, standings) = watch::channel(*stack.standing());
+        let refused_setpoints = Arc::new(AtomicU64::new(0));
         let changes = Arc::new(Outlet::new(Shared::CHANGES));
         let messages = Arc::new(Outlet::new(Shared::MESSAGES));
         let publisher = Publisher {
             directory,
             standing,
+            refused_setpoints: refused_setpoints.clone(),
             changes: changes.clone(),
             messages: messages.clone(),
         };
@@ -209,6 +211,7 @@ impl Builder {
             known: membership.directory(),
             directories,
             standings,
+            refused_setpoints,
             changes,
             messages,
             requests: AtomicU8::new(u8::MAX),

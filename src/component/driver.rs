@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -66,6 +68,7 @@ pub(super) struct Publisher {
     /// Wakes tasks that wait for a change of the directory.
     pub(super) directory: watch::Sender<()>,
     pub(super) standing: watch::Sender<Standing>,
+    pub(super) refused_setpoints: Arc<AtomicU64>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
 }
@@ -275,6 +278,8 @@ impl Driver {
                 Event::Message(message) => self.publisher.messages.send(message),
             }
         }
+        let refused = self.stack.refused_setpoints();
+        self.publisher.refused_setpoints.store(refused, Relaxed);
         self.membership.publish();
         self.cancel_abandoned();
     }

@@ -1,7 +1,8 @@
 //! The application's handle to a component.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU8;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU8, AtomicU64};
 use std::time::SystemTime;
 
 use bytes::Bytes;
@@ -53,6 +54,7 @@ pub(super) struct Shared {
     pub(super) known: Arc<NodeDirectory>,
     pub(super) directories: watch::Receiver<()>,
     pub(super) standings: watch::Receiver<Standing>,
+    pub(super) refused_setpoints: Arc<AtomicU64>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
     /// The number of the next request.
@@ -102,6 +104,13 @@ impl Component {
     #[must_use]
     pub fn watch_standing(&self) -> watch::Receiver<Standing> {
         self.shared.standings.clone()
+    }
+
+    /// How many setpoints the component has refused because their senders had superseded them:
+    /// they were late, or retransmitted.
+    #[must_use]
+    pub fn refused_setpoints(&self) -> u64 {
+        self.shared.refused_setpoints.load(Relaxed)
     }
 
     /// Sets the condition of this component, which Management reports to clients.

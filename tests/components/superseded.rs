@@ -1,14 +1,19 @@
 //! Setpoints that wait for their acknowledgement, and what supersedes them.
 
+use std::net::{Ipv4Addr, UdpSocket};
+
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::component::{Component, DeliverError, Kind};
+use jaus::component::{Component, DeliverError, Handlers, Kind, Management};
 use jaus::endpoint::Counter;
-use jaus::messages::core::{QueryStatus, Standby};
-use jaus::messages::mobility::{SetLocalWaypoint, SetWrenchEffort};
+use jaus::messages::core::{QueryStatus, RequestControl, Resume, Standby};
+use jaus::messages::mobility::{
+    QueryWrenchEffort, SetLocalWaypoint, SetWrenchEffort, primitive_driver,
+};
 use jaus::node::{Config, Node, Undelivered};
+use jaus::wire::{Frame, judp};
 use jaus_test_kit::group::own_group;
-use jaus_test_kit::waiting::within_limit;
+use jaus_test_kit::waiting::{until, within_limit};
 use tokio::task::JoinHandle;
 
 /// Nobody has this id, so nobody acknowledges.
@@ -60,4 +65,35 @@ async fn a_newer_setpoint_or_a_stop_cancels_those_that_are_not_acknowledged() {
         );
         assert!(unacknowledged, "{outcome:?}");
     }
+}
+
+#[tokio::test]
+async fn a_component_counts_the_setpoints_that_it_refuses() {
+    let node = Node::start(Config::loopback(101, 1).group(own_group())).unwrap();
+    let driver = Handlers::new(primitive_driver::LATEST)
+        .command(|_: SetWrenchEffort, _, _| {})
+        .declines::<QueryWrenchEffort>()
+        .on_stop(|_| {});
+    let builder = Component::builder(Kind::Vehicle, "Rover").offer(driver);
+    let rover = builder.management(Management::new());
+    let rover = rover.attach(&node, PEER.component()).unwrap();
+    let (socket, to) = (UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)), node.links());
+    let (socket, to) = (socket.unwrap(), to[0].local);
+    let payloads = [
+        (20, RequestControl { authority_code: 9 }.encode().unwrap()),
+        (21, Resume {}.encode().unwrap()),
+        (23, SetWrenchEffort::default().encode().unwrap()),
+        // Overtaken by the one before.
+        (22, SetWrenchEffort::default().encode().unwrap()),
+    ];
+    for (sequence, payload) in payloads {
+        let client = JausId::new(42, 1, 1);
+        let frame = Frame {
+            sequence,
+            ..Frame::new(client, rover.id(), payload)
+        };
+        let datagram = judp::encode(&frame).unwrap();
+        socket.send_to(&datagram, to).unwrap();
+    }
+    until(|| rover.refused_setpoints() == 1).await;
 }

@@ -68,6 +68,10 @@ fn add_component(exposition: &mut Exposition, component: &Component, emergencies
     exposition
         .counter("jaus_component_emergencies", Unit::None, help)
         .add(&[("component", &id)], emergencies);
+    let help = "Setpoints that were refused because their senders had superseded them.";
+    exposition
+        .counter("jaus_component_refused_setpoints", Unit::None, help)
+        .add(&[("component", &id)], component.refused_setpoints());
     let help = "Whether a client is in control of the component (1) or none (0).";
     let mut controlled = exposition.gauge("jaus_component_controlled", Unit::None, help);
     if standing.exclusive {

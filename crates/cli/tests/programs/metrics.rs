@@ -158,6 +158,7 @@ fn state_services_and_counters_of_a_program_are_served() {
         "jaus_node_info{node=\"131.1\"} 1",
         "jaus_component_controlled{component=\"131.1.33\"} 0",
         "jaus_component_emergencies_total{component=\"131.1.33\"} 0",
+        "jaus_component_refused_setpoints_total{component=\"131.1.33\"} 0",
         "jaus_dropped_total{reason=\"malformed\"} 0",
         "jaus_vehicle_speed_meters_per_second 0",
     ] {
