@@ -15,6 +15,8 @@ pub(super) enum Said<'a> {
         version: u32,
         /// Number of the page at the station.
         page: u64,
+        /// What the page shows when it connects again in place of this connection.
+        secret: Option<&'a str>,
         token_needed: bool,
         /// Whether a page without the token may look, and stop vehicles.
         watch: bool,

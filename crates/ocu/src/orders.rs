@@ -13,6 +13,7 @@ use super::ownership::{Owner, PageId};
 use super::page_link::TooOld;
 use super::request::OperatorRequest;
 use super::state::{Events, Overlay};
+use super::token::Token;
 use super::vehicle_link::VehicleLinkQuality;
 
 /// Callback for the result of a request: success, or the reason for failure.
@@ -60,9 +61,17 @@ pub(super) struct OpenedPage {
     pub(super) operator: Owner,
     /// The vehicle that the page wants to show.
     pub(super) vehicle: Option<u16>,
-    /// The previous connection of the same page, which may not have ended yet.
-    pub(super) replaces: Option<PageId>,
+    /// What the station tells this page alone, so that no other page can replace it.
+    pub(super) secret: Option<Token>,
+    pub(super) replaces: Option<ReplacedPage>,
     pub(super) states: watch::Sender<Snapshot>,
+}
+
+/// The previous connection of a page, which may not have ended yet.
+pub(super) struct ReplacedPage {
+    pub(super) page: PageId,
+    /// What the station has told that page.
+    pub(super) secret: String,
 }
 
 /// A setpoint of manual drive.

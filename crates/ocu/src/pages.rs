@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use tokio::sync::watch;
 
-use super::orders::{OpenedPage, Snapshot};
+use super::orders::{OpenedPage, ReplacedPage, Snapshot};
 use super::ownership::{Owner, PageId};
+use super::token::Token;
 
 /// All pages that are connected.
 #[derive(Default)]
@@ -16,6 +17,7 @@ pub(crate) struct Pages {
 
 struct Page {
     operator: Owner,
+    secret: Option<Token>,
     vehicle: Option<u16>,
     states: watch::Sender<Snapshot>,
 }
@@ -25,11 +27,13 @@ impl Pages {
         let OpenedPage {
             operator,
             vehicle,
+            secret,
             states,
             ..
         } = opened;
         let page = Page {
             operator,
+            secret,
             vehicle,
             states,
         };
@@ -43,6 +47,13 @@ impl Pages {
     /// The operator at a page; `None` if the page is gone.
     pub(crate) fn operator(&self, page: PageId) -> Option<&Owner> {
         Some(&self.open.get(&page)?.operator)
+    }
+
+    /// Whether a page that replaces this one has shown its secret.
+    pub(crate) fn is_replaced(&self, replaced: &ReplacedPage) -> bool {
+        let page = self.open.get(&replaced.page);
+        let secret = page.and_then(|page| page.secret.as_ref());
+        secret.is_some_and(|secret| secret.is(&replaced.secret))
     }
 
     /// The vehicle that a page shows.

@@ -32,6 +32,8 @@ export class Link extends EventTarget {
   #vehicle = number(Number(sessionStorage.getItem(VEHICLE) ?? NaN));
   /** The number of this page at the station; null before the first connection. */
   #page = null;
+  /** What the station has told this page alone: it shows that to replace its connection. */
+  #secret = "";
   #quality = null;
   #flow = new Flow((frame) => this.#transmit(frame));
   /** Resolves to whether the page may connect. */
@@ -185,7 +187,10 @@ export class Link extends EventTarget {
     const query = new URLSearchParams();
     if (this.#vehicle !== null) query.set("vehicle", this.#vehicle);
     // The station may not have noticed yet that the connection before is gone.
-    if (this.#page !== null) query.set("replaces", this.#page);
+    if (this.#page !== null) {
+      query.set("replaces", this.#page);
+      query.set("secret", this.#secret);
+    }
     const socket = new WebSocket(`${scheme}//${location.host}/ws?${query}`, this.protocols);
     this.#socket = socket;
     this.#receivedAt = performance.now();
@@ -209,6 +214,7 @@ export class Link extends EventTarget {
     switch (frame.type) {
       case "hello":
         this.#page = number(frame.page);
+        this.#secret = plain(frame.secret, 64);
         this.#flow.reset();
         this.#quality = null;
         this.#emit("hello", frame);

@@ -18,11 +18,13 @@ use super::view::{self, MessageView};
 use super::visitor::Visitor;
 use crate::answer::Said as Answer;
 use crate::orders::{
-    DriveOrder, OpenedPage, Order, Reply, Snapshot, StopOrder, StopReply, StopTarget, json,
+    DriveOrder, OpenedPage, Order, ReplacedPage, Reply, Snapshot, StopOrder, StopReply, StopTarget,
+    json,
 };
 use crate::ownership::{Owner, PageId};
 use crate::page_link::{PageLink, Seen, TooOld};
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
+use crate::token::Token;
 use crate::users::UserRole;
 use jaus::node::now;
 use jaus_view::Filter;
@@ -53,8 +55,9 @@ const LINK: Duration = Duration::from_secs(1);
 pub(super) struct Introduction {
     /// The vehicle to show.
     vehicle: Option<u16>,
-    /// The number of the same page's previous connection.
+    /// The number of the same page's previous connection, and the secret that came with it.
     replaces: Option<u64>,
+    secret: Option<String>,
 }
 
 /// The link to the page. The reader notes confirmations, and the writer the states that it sends.
@@ -81,13 +84,20 @@ pub(super) async fn serve(
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
     let visitor = Arc::new(visitor);
     let (states, snapshots) = watch::channel(Snapshot::default());
+    // Without random numbers no page can replace this one.
+    let secret = Token::generate().ok();
+    let replaced = introduction.replaces.zip(introduction.secret);
     let opened = OpenedPage {
         operator: Owner {
             page,
             user: Arc::clone(&visitor.user),
         },
         vehicle: introduction.vehicle,
-        replaces: introduction.replaces.map(PageId),
+        secret: secret.clone(),
+        replaces: replaced.map(|(page, secret)| ReplacedPage {
+            page: PageId(page),
+            secret,
+        }),
         states,
     };
     // On error the session has ended, which the writer notices.
@@ -110,6 +120,7 @@ pub(super) async fn serve(
     };
     let writer = Writer {
         page,
+        secret,
         shared: &shared,
         visitor: &visitor,
         link: &link,
@@ -460,6 +471,7 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
 /// Sends all data to the page until it stops accepting or the session has ended.
 struct Writer<'s> {
     page: PageId,
+    secret: Option<Token>,
     shared: &'s Shared,
     visitor: &'s Visitor,
     link: &'s SharedLink,
@@ -552,6 +564,7 @@ impl Writer<'_> {
         text(&json(&Answer::Hello {
             version: VERSION,
             page: self.page.0,
+            secret: self.secret.as_ref().map(Token::reveal),
             token_needed: admission.gate.token().is_some(),
             watch: admission.gate.lets_watch(),
             operator: admission.operator.to_string(),

@@ -76,9 +76,8 @@ impl Session {
     }
 
     fn open(&mut self, now: Instant, opened: OpenedPage) {
-        if let Some(before) = opened.replaces
-            && let Some(operator) = self.pages.operator(before)
-            && operator.user == opened.operator.user
+        if let Some(before) = &opened.replaces
+            && self.pages.is_replaced(before)
         {
             self.close(now, before);
         }

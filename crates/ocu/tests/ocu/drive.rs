@@ -244,6 +244,24 @@ async fn a_page_that_connects_again_keeps_its_vehicle_although_its_old_connectio
 }
 
 #[tokio::test]
+async fn a_page_cannot_take_the_vehicle_of_another_page_by_claiming_to_replace_it() {
+    let scene = Scene::new().await;
+    let mut driver = scene.driver().await;
+    driver.drive(0.5).await.unwrap();
+    // Both pages have the station's token, and each has a secret of its own.
+    let other = scene.page().await;
+    let own = other.hello["secret"].as_str().unwrap().to_owned();
+    assert_ne!(driver.hello["secret"], other.hello["secret"]);
+    for secret in ["", "0123456789abcdef0123456789abcdef", &own] {
+        let mut thief = driver.replace(scene.address, 101, secret).await;
+        thief.until(|state| !state["vehicle"].is_null()).await;
+        let refused = thief.drive(0.5).await.unwrap_err();
+        assert!(refused.contains("controls vehicle"), "{refused}");
+    }
+    driver.drive(0.5).await.unwrap();
+}
+
+#[tokio::test]
 async fn a_setpoint_by_an_old_picture_is_refused_and_stops_the_vehicle() {
     let scene = Scene::new().await;
     let mut page = scene.driver().await;

@@ -332,8 +332,14 @@ impl Page {
 
     /// Opens a page again after its connection was lost, as the page of the browser does.
     pub(crate) async fn reopen(&self, address: SocketAddr, vehicle: u16) -> Self {
+        let secret = self.hello["secret"].as_str().unwrap();
+        self.replace(address, vehicle, secret).await
+    }
+
+    /// Opens a page that claims to be this one, with a secret.
+    pub(crate) async fn replace(&self, address: SocketAddr, vehicle: u16, secret: &str) -> Self {
         let page = &self.hello["page"];
-        let url = format!("ws://{address}/ws?vehicle={vehicle}&replaces={page}");
+        let url = format!("ws://{address}/ws?vehicle={vehicle}&replaces={page}&secret={secret}");
         Self::open_at(&url, &[]).await.unwrap()
     }
 
