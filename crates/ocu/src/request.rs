@@ -4,6 +4,7 @@ use jaus::address::JausId;
 use serde::Deserialize;
 
 use super::page_link::Seen;
+use super::users::UserRole;
 
 /// One frame from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -109,6 +110,8 @@ pub enum OperatorRequest {
         /// Whether to set it.
         on: bool,
     },
+    /// Clear the emergencies that other clients have set at the vehicle, too.
+    ClearAnyEmergency,
     /// Drive manually.
     Drive {
         /// Forward, -1 to 1.
@@ -194,6 +197,18 @@ impl OperatorRequest {
         )
     }
 
+    /// The role that it needs, at a station with users or one with a token alone.
+    pub(crate) const fn needs(&self, has_users: bool) -> UserRole {
+        match self {
+            // Selecting is looking at another vehicle.
+            Self::Select { .. } => UserRole::Observe,
+            _ if self.is_stop() => UserRole::Observe,
+            // Who has stopped the vehicle may have seen what this user does not see.
+            Self::ClearAnyEmergency if has_users => UserRole::Administer,
+            _ => UserRole::Drive,
+        }
+    }
+
     /// Its name in the audit log.
     pub(crate) const fn name(&self) -> &'static str {
         match self {
@@ -208,6 +223,7 @@ impl OperatorRequest {
             Self::Emergency { on: false } => "clear emergency",
             Self::EmergencyAll { on: true } => "set emergency of all",
             Self::EmergencyAll { on: false } => "clear emergency of all",
+            Self::ClearAnyEmergency => "clear emergencies of all clients",
             Self::Drive { .. } => "drive",
             Self::DriveEnd => "end drive",
             Self::TakeOver => "take over from mission",

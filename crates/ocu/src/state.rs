@@ -147,6 +147,8 @@ pub struct VehicleState {
     /// Whether the vehicle reports an emergency. If this operator has set it: whether every part has
     /// confirmed it. It says nothing of the vehicle's motion.
     pub emergency: bool,
+    /// Whether the emergency is one that other clients have set, or the vehicle's own.
+    pub emergency_of_others: bool,
     /// Whether the vehicle is at rest by its measured velocity; `null` without a fresh measurement.
     pub at_rest: Option<bool>,
     /// Whether the vehicle moves in an emergency and does not slow down.

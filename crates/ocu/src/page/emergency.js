@@ -4,7 +4,7 @@
 
 import { get, mark, say, show, toast } from "./dom.js";
 import { StopLink } from "./stop_link.js";
-import { pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
+import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
 const CLEAR_TEXT = "The vehicle can move again once a client resumes and commands it. Check it first.";
 const touch = matchMedia("(hover: none)");
@@ -26,6 +26,9 @@ export class Emergency {
   /** Why the station takes no requests from this page; empty if it does. */
   #barred = "";
   #clears = false;
+  /** Whether other clients have set the emergency, and whether this page may clear theirs. */
+  #ofOthers = false;
+  #clearsAny = false;
   #unbar;
 
   /** Calls `unbar` when the operator stops a vehicle and the station takes no requests. */
@@ -40,9 +43,10 @@ export class Emergency {
     get("estop-all").addEventListener("click", () => this.stopAll());
     get("estop-clear").addEventListener("click", () => this.#openSheet());
     get("clear-no").addEventListener("click", () => this.#closeSheet());
-    get("clear-yes").addEventListener("click", () => this.#clear("emergency"));
+    get("clear-yes").addEventListener("click", () => this.#clear({ type: "emergency", on: false }));
+    get("clear-any").addEventListener("click", () => this.#clear({ type: "clear_any_emergency" }));
     for (const id of ["clear-all", "latch-clear"]) {
-      get(id).addEventListener("click", () => this.#clear("emergency_all"));
+      get(id).addEventListener("click", () => this.#clear({ type: "emergency_all", on: false }));
     }
     this.#render();
   }
@@ -83,13 +87,14 @@ export class Emergency {
 
   /**
    * Takes a state with whether it is live, the list of vehicles with whether all are to be stopped, why
-   * the station takes no requests, and whether it lets this page clear emergencies.
+   * the station takes no requests, and whether it lets this page clear emergencies, also of others.
    */
-  update(state, live, { vehicles, allStopped }, barred, clears) {
+  update(state, live, { vehicles, allStopped }, barred, { clears, clearsAny }) {
     this.#vehicles = vehicles;
     this.#latched = allStopped;
     this.#barred = barred;
-    this.#clears = clears;
+    [this.#clears, this.#clearsAny] = [clears, clearsAny];
+    this.#ofOthers = live && state?.vehicle?.emergency_of_others === true;
     this.#condition = stopCondition(state?.vehicle, live);
     this.#speed = state?.vehicle?.velocity?.x;
     if (this.#condition) this.#wanted = false;
@@ -131,12 +136,14 @@ export class Emergency {
     const stopped = this.#vehicles.filter(({ state }) => state === "emergency").length;
     show(get("clear-all"), stopped > 1 || this.#latched);
     show(get("estop-clear"), this.#condition !== null && this.#clears);
+    show(get("clear-any"), this.#ofOthers && this.#clearsAny);
     if (this.#condition === null) show(get("clear-sheet"), false);
   }
 
   #openSheet() {
     const moves = this.#condition !== "stopped";
-    say(get("clear-text"), `${moves ? "The vehicle is not known to be at rest. " : ""}${CLEAR_TEXT}`);
+    const others = this.#ofOthers ? othersWords(this.#clearsAny) : "";
+    say(get("clear-text"), `${others}${moves ? "The vehicle is not known to be at rest. " : ""}${CLEAR_TEXT}`);
     show(get("clear-sheet"), true);
     get("clear-no").focus();
   }
@@ -147,10 +154,10 @@ export class Emergency {
     show(sheet, false);
   }
 
-  async #clear(type) {
+  async #clear(request) {
     this.#closeSheet();
-    const reason = await this.#link.ask({ type, on: false });
-    if (reason === null) toast("good", type === "emergency_all" ? "All emergencies cleared." : "Emergency cleared.");
+    const reason = await this.#link.ask(request);
+    if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);
   }
 }

@@ -84,8 +84,9 @@ function render() {
   // Who may look may stop.
   const barred = account.missing || (link.open && link.settled && !trusted && !watchable);
   const hint = account.users ? account.hindrance : "enter the token to use it";
-  emergency.update(state, live, fleet, barred ? hint : "", trusted);
-  sound.update(state, live, fleet.vehicles);
+  const clearsAny = trusted && (!account.users || account.role === "administer");
+  emergency.update(state, live, fleet, barred ? hint : "", { clears: trusted, clearsAny });
+  sound.update(state, live, fleet.vehicles, link.page);
   fleet.update(state, live, link.page);
   const hindrance = hindered(live);
   if (state) mission.update(state, operable);

@@ -29,6 +29,12 @@ export function stopWords(condition, speed) {
   }[condition];
 }
 
+/** Who has to clear an emergency that this station has not set. `may` says whether this page may, too. */
+export function othersWords(may) {
+  const who = "Another client or a stop input has stopped this vehicle, and is to clear that. ";
+  return may ? `${who}Clear it here only if you know why. ` : `${who}An administrator can clear it here. `;
+}
+
 /** The vehicles that are present, by how far their stop is. */
 function sorted(vehicles) {
   const present = vehicles.filter(({ presence }) => presence === "present");

@@ -19,7 +19,7 @@ impl Picture {
     pub(crate) fn vehicle_state(
         &self,
         now: Instant,
-        emergency_wanted: bool,
+        (emergency_wanted, emergency_clearing): (bool, bool),
         obstacle: impl Fn(JausId) -> Option<String>,
     ) -> Option<state::VehicleState> {
         let is_known = self.directory.subsystem(self.vehicle).is_some();
@@ -48,6 +48,7 @@ impl Picture {
             missing: self.missing_state(now),
             stale: self.stale(now),
             emergency: if emergency_wanted { all } else { any },
+            emergency_of_others: any && !emergency_wanted && !emergency_clearing,
             at_rest: self.at_rest(now),
             runaway: self.is_runaway(now),
             held: self.hold_reason(now),

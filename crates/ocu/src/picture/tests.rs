@@ -367,7 +367,9 @@ fn moving(speed: f64) -> ReportVelocityState {
 
 fn shown(picture: &Picture, now: Instant) -> state::VehicleState {
     // The directory, which decides whether there is a vehicle at all, is empty here.
-    picture.vehicle_state(now, false, |_| None).unwrap()
+    picture
+        .vehicle_state(now, (false, false), |_| None)
+        .unwrap()
 }
 
 #[test]

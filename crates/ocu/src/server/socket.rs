@@ -337,7 +337,7 @@ impl Reader<'_> {
         };
         let reply = self.recorded(id, vehicle, request);
         if !self.visitor.may(UserRole::Drive) {
-            return reply(Err(self.why_not()));
+            return reply(Err(self.why_not(UserRole::Drive)));
         }
         let order = DriveOrder {
             page: self.page,
@@ -355,11 +355,9 @@ impl Reader<'_> {
     async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
         let reply = self.recorded(id, vehicle, request);
         let may_drive = self.visitor.may(UserRole::Drive);
-        // Selecting is looking at another vehicle.
-        let needs_less = request.is_stop() || matches!(request, OperatorRequest::Select { .. });
-        let may_ask = may_drive || (needs_less && self.visitor.may(UserRole::Observe));
-        if !may_ask {
-            return reply(Err(self.why_not()));
+        let needed = request.needs(self.shared.admission.gate.users().is_some());
+        if !self.visitor.may(needed) {
+            return reply(Err(self.why_not(needed)));
         }
         let access = &self.shared.access;
         // On error the session has ended, which the writer notices.
@@ -413,14 +411,14 @@ impl Reader<'_> {
         })
     }
 
-    /// Why the visitor may not change anything.
-    fn why_not(&self) -> String {
+    /// Why the visitor may not do what needs this role.
+    fn why_not(&self, needed: UserRole) -> String {
         if self.shared.admission.gate.users().is_none() {
             return "this requires the token that jaus-ocu printed or read from its file"
                 .to_owned();
         }
         format!(
-            "this requires the role drive; {} may only observe",
+            "this requires the role {needed}; {} does not have it",
             self.visitor.user
         )
     }

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use super::client::Client;
+use super::client::{AlarmChange, Cleared, Client};
 use crate::orders::Reply;
 use crate::picture::Picture;
 use jaus::address::JausId;
@@ -17,8 +17,8 @@ pub(super) struct Alarm {
     since: Option<Instant>,
     /// When it was last sent to all parts that have not confirmed it.
     shouted: Option<Instant>,
-    /// Until when clearing is repeated.
-    clearing: Option<Instant>,
+    /// Until when clearing is repeated, and whose emergency.
+    clearing: Option<(Instant, Cleared)>,
     /// Parts with a delivery in progress.
     busy: BTreeSet<JausId>,
     waiting: Vec<Waiting>,
@@ -60,13 +60,24 @@ impl Alarm {
         is_new
     }
 
+    /// Whether the end of an emergency is being sent.
+    pub(super) const fn is_clearing(&self) -> bool {
+        self.clearing.is_some()
+    }
+
     /// Clears the emergency.
-    pub(super) fn clear(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
+    pub(super) fn clear(
+        &mut self,
+        now: Instant,
+        whose: Cleared,
+        picture: &Picture,
+        client: &mut Client,
+    ) {
         if self.wanted {
             tracing::info!("emergency: cleared for vehicle {}", picture.vehicle());
         }
         self.wanted = false;
-        self.clearing = Some(now + Self::PATIENCE);
+        self.clearing = Some((now + Self::PATIENCE, whose));
         self.handle_time(now, picture, client);
     }
 
@@ -111,17 +122,15 @@ impl Alarm {
         if self.wanted {
             self.shout(now, picture, client);
         }
-        let left: Vec<JausId> = if self.wanted {
-            picture.not_in_emergency(now).collect()
-        } else if self.clearing.is_some_and(|until| now < until) {
-            picture.in_emergency().collect()
-        } else {
-            self.clearing = None;
-            Vec::new()
+        self.clearing = self.clearing.filter(|(until, _)| now < *until);
+        let (left, change): (Vec<JausId>, _) = match self.clearing {
+            _ if self.wanted => (picture.not_in_emergency(now).collect(), AlarmChange::Set),
+            Some((_, whose)) => (picture.in_emergency().collect(), AlarmChange::Clear(whose)),
+            None => return self.answer(now, picture),
         };
         for part in left {
             if self.busy.insert(part) {
-                client.alarm(part, self.wanted);
+                client.alarm(part, change);
             }
         }
         self.answer(now, picture);
@@ -156,7 +165,8 @@ fn in_words(on: bool, left: &[JausId]) -> String {
     } else {
         format!(
             "{left} is still in emergency: it does not answer, or another client set an emergency \
-             and must clear it"
+             and must clear it, or its stop input is pressed; a station clears the emergencies of \
+             others only over a secure link, with a key that has the right clear-emergency=any"
         )
     }
 }

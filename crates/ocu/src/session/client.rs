@@ -59,6 +59,22 @@ pub(super) struct Client {
     jobs: JoinSet<Finished>,
 }
 
+/// Whose emergency is cleared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cleared {
+    /// That of this station.
+    Own,
+    /// Those of all clients, for which the vehicle requires a right of its own.
+    Any,
+}
+
+/// What a part is told about an emergency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum AlarmChange {
+    Set,
+    Clear(Cleared),
+}
+
 /// Timeout of a job that a requester waits for.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Timeout of a query that measures the round trip.
@@ -170,12 +186,12 @@ impl Client {
         });
     }
 
-    /// Sends the start or the end of our emergency to a part, then queries its status.
-    pub(super) fn alarm(&mut self, peer: JausId, on: bool) {
+    /// Sends the start or the end of an emergency to a part, then queries its status.
+    pub(super) fn alarm(&mut self, peer: JausId, change: AlarmChange) {
         let component = self.component.clone();
         self.jobs.spawn(async move {
             let deed = async {
-                note(peer, emergency::deliver(&component, peer, on).await);
+                note(peer, emergency::deliver(&component, peer, change).await);
             };
             // Some peers never acknowledge. Their status decides.
             let _ = timeout(ALARM_PATIENCE, deed).await;
@@ -209,16 +225,15 @@ pub(super) async fn deliver<M: Message>(session: &Session, command: &M) -> Resul
 /// The only functions that send an emergency, so that its priority is set in one place.
 mod emergency {
     use jaus::address::JausId;
-    use jaus::component::{Component, DeliverError, SendError};
+    use jaus::component::{CLEAR_ALL, Component, DeliverError, SendError};
     use jaus::messages::core::set_emergency::EmergencyCode;
     use jaus::messages::core::{ClearEmergency, SetEmergency};
     use jaus::wire::Priority;
 
+    use super::{AlarmChange, Cleared};
+
     const PRIORITY: Priority = Priority::SafetyCritical;
     const SET: SetEmergency = SetEmergency {
-        emergency_code: EmergencyCode(1),
-    };
-    const CLEAR: ClearEmergency = ClearEmergency {
         emergency_code: EmergencyCode(1),
     };
 
@@ -231,13 +246,15 @@ mod emergency {
     pub(super) async fn deliver(
         component: &Component,
         peer: JausId,
-        on: bool,
+        change: AlarmChange,
     ) -> Result<(), DeliverError> {
-        if on {
-            component.deliver_with(PRIORITY, peer, &SET).await
-        } else {
-            component.deliver_with(PRIORITY, peer, &CLEAR).await
-        }
+        let emergency_code = match change {
+            AlarmChange::Set => return component.deliver_with(PRIORITY, peer, &SET).await,
+            AlarmChange::Clear(Cleared::Own) => 1.into(),
+            AlarmChange::Clear(Cleared::Any) => CLEAR_ALL.into(),
+        };
+        let clear = ClearEmergency { emergency_code };
+        component.deliver_with(PRIORITY, peer, &clear).await
     }
 }
 

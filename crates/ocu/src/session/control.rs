@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::Session;
-use super::client::{Client, release_all};
+use super::client::{Cleared, Client, release_all};
 use super::lease::Wanted;
 use super::vehicle::Vehicle;
 use crate::orders::{OpenedPage, Order, Reply};
@@ -79,7 +79,7 @@ impl Session {
         if let Some(before) = &opened.replaces
             && self.pages.is_replaced(before)
         {
-            self.close(now, before);
+            self.close(now, before.page);
         }
         self.pages.open(opened);
         self.show();
@@ -111,7 +111,11 @@ impl Session {
         match request {
             OperatorRequest::Emergency { on: false } => {
                 self.note_emergency(now, meant.or(shown), &self.user(page), false);
-                return self.clear_emergency(now, meant.or(shown), reply);
+                return self.clear_emergency(now, meant.or(shown), Cleared::Own, reply);
+            }
+            OperatorRequest::ClearAnyEmergency => {
+                self.note_emergency(now, meant.or(shown), &self.user(page), false);
+                return self.clear_emergency(now, meant.or(shown), Cleared::Any, reply);
             }
             OperatorRequest::EmergencyAll { on: false } => {
                 self.note_emergency_of_all(now, &self.user(page), false);
@@ -250,6 +254,7 @@ impl Vehicle {
             | OperatorRequest::Handover { .. }
             | OperatorRequest::Emergency { .. }
             | OperatorRequest::EmergencyAll { .. }
+            | OperatorRequest::ClearAnyEmergency
             | OperatorRequest::Drive { .. }
             | OperatorRequest::DriveEnd => reply(Err("not a request for a vehicle".to_owned())),
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use tokio::sync::oneshot;
 
 use super::Session;
-use super::client::{Client, Finished};
+use super::client::{Cleared, Client, Finished};
 use super::control::{NO_VEHICLE, in_words};
 use super::vehicle::Vehicle;
 use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
@@ -67,11 +67,17 @@ impl Session {
 
     /// Clears the emergency of a vehicle. If it was the last one after a stop of all, vehicles that
     /// appear later are not stopped either: nothing would show why.
-    pub(super) fn clear_emergency(&mut self, now: Instant, number: Option<u16>, reply: Reply) {
+    pub(super) fn clear_emergency(
+        &mut self,
+        now: Instant,
+        number: Option<u16>,
+        whose: Cleared,
+        reply: Reply,
+    ) {
         let Some(vehicle) = number.and_then(|number| self.fleet.get_mut(number)) else {
             return reply(Err(NO_VEHICLE.to_owned()));
         };
-        vehicle.clear_emergency(now, &mut self.client);
+        vehicle.clear_emergency(now, whose, &mut self.client);
         vehicle.await_emergency(now, false, reply);
         if !self.fleet.iter_mut().any(|it| it.alarm.is_wanted()) {
             self.all_stopped = false;
@@ -84,7 +90,7 @@ impl Session {
         self.all_stopped = false;
         let mut cleared: Vec<&mut Vehicle> = Vec::new();
         for vehicle in self.fleet.iter_mut().filter(|it| it.is_stopped()) {
-            vehicle.clear_emergency(now, &mut self.client);
+            vehicle.clear_emergency(now, Cleared::Own, &mut self.client);
             cleared.push(vehicle);
         }
         await_all(now, false, cleared, &mut self.client, reply);
@@ -146,8 +152,8 @@ impl Vehicle {
         is_new
     }
 
-    fn clear_emergency(&mut self, now: Instant, client: &mut Client) {
-        self.alarm.clear(now, &self.picture, client);
+    fn clear_emergency(&mut self, now: Instant, whose: Cleared, client: &mut Client) {
+        self.alarm.clear(now, whose, &self.picture, client);
     }
 
     fn await_emergency(&mut self, now: Instant, on: bool, reply: Reply) {

@@ -191,8 +191,8 @@ impl Vehicle {
 
     pub(super) fn state(&self, now: Instant) -> Option<state::VehicleState> {
         let obstacle = |part| self.lease.obstacle(part);
-        self.picture
-            .vehicle_state(now, self.alarm.is_wanted(), obstacle)
+        let emergency = (self.alarm.is_wanted(), self.alarm.is_clearing());
+        self.picture.vehicle_state(now, emergency, obstacle)
     }
 
     pub(super) fn control_state(&self) -> state::Control {

@@ -98,6 +98,25 @@ impl Scene {
         start(station, 43, self.group).await
     }
 
+    /// Starts a station on the vehicle's own node. Returns its address, and a handle that keeps it
+    /// alive.
+    pub(crate) async fn station_of_the_vehicle(&self) -> (SocketAddr, JoinHandle<()>) {
+        let station = Station {
+            vehicles: vec![101],
+            listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+            unprotected: true,
+            ..Station::default()
+        };
+        start_on(&self.nodes[0], 2, station).await
+    }
+
+    /// A client that is no station, and its node.
+    pub(crate) fn client(&self) -> (Component, Node) {
+        let node = Node::start(Config::loopback(44, 1).group(self.group)).unwrap();
+        let client = Component::builder(Kind::OperatorControlUnit, "Client").attach(&node, 1);
+        (client.unwrap(), node)
+    }
+
     /// Starts another vehicle on the same network.
     pub(crate) fn another_vehicle(&self, subsystem: u16) -> OtherVehicle {
         let node = Node::start(Config::loopback(subsystem, 1).group(self.group)).unwrap();
@@ -292,10 +311,16 @@ async fn start(
     group: Group,
 ) -> (SocketAddr, JoinHandle<()>, Node) {
     let node = Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+    let (address, running) = start_on(&node, 1, station).await;
+    (address, running, node)
+}
+
+/// Starts a station as a component of a node.
+async fn start_on(node: &Node, number: u8, station: Station) -> (SocketAddr, JoinHandle<()>) {
     let open = station.open().await.unwrap();
     let address = open.address();
     let slot = Slot::new(
-        node.attach(1).unwrap(),
+        node.attach(number).unwrap(),
         node.clone(),
         Kind::OperatorControlUnit,
         "Operator",
@@ -304,7 +329,7 @@ async fn start(
         let Err(error) = open.run(slot).await;
         panic!("the station has ended: {error}");
     });
-    (address, running, node)
+    (address, running)
 }
 
 pub(crate) type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;

@@ -11,7 +11,7 @@ use tokio::time::timeout;
 use tokio_tungstenite::connect_async;
 use tokio_tungstenite::tungstenite::Message;
 
-use crate::scene::{Scene, Socket, driver_of};
+use crate::scene::{Page, Scene, Socket, driver_of};
 
 async fn stops(scene: &Scene) -> Socket {
     let url = format!("ws://{}/stop", scene.address);
@@ -69,6 +69,38 @@ async fn all_vehicles_are_stopped_by_one_frame() {
     scene
         .until(|scene| emergency(scene) && second.rover.standing().state == State::Emergency)
         .await;
+}
+
+#[tokio::test]
+async fn the_emergency_of_another_client_is_cleared_only_by_a_station_with_that_right() {
+    let clear_any = json!({"type": "clear_any_emergency"});
+    let of_others = |state: &serde_json::Value| state["vehicle"]["emergency_of_others"] == true;
+    let scene = Scene::new().await;
+    let mut page = scene.page().await;
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    let (client, _node) = scene.client();
+    client
+        .set_emergency(scene.rover.as_ref().unwrap().id())
+        .await
+        .unwrap();
+    page.until(of_others).await;
+    // Over a link without keys a station has no such right.
+    for request in [json!({"type": "emergency", "on": false}), clear_any.clone()] {
+        let refused = page.ask(request).await.unwrap_err();
+        assert!(
+            refused.contains("another client set an emergency"),
+            "{refused}"
+        );
+        assert!(refused.contains("clear-emergency=any"), "{refused}");
+    }
+    assert!(emergency(&scene));
+    // On the vehicle's own node it has.
+    let (address, _running) = scene.station_of_the_vehicle().await;
+    let mut page = Page::open(address).await;
+    page.until(of_others).await;
+    page.ask(clear_any).await.unwrap();
+    scene.until(|scene| !emergency(scene)).await;
 }
 
 #[tokio::test]

@@ -275,6 +275,22 @@ async fn one_who_observes_sees_the_vehicle_and_stops_it_and_does_nothing_else() 
 }
 
 #[tokio::test]
+async fn the_emergencies_of_others_are_cleared_by_an_administrator_alone() {
+    let guarded = Guarded::new().await;
+    let clear_any = json!({"type": "clear_any_emergency"});
+    let mut page = guarded.page(&guarded.login("ben").await).await;
+    let refused = page.ask(clear_any.clone()).await.unwrap_err();
+    assert!(
+        refused.contains("requires the role administer"),
+        "{refused}"
+    );
+    let mut page = guarded.page(&guarded.login("anna").await).await;
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    page.ask(clear_any).await.unwrap();
+}
+
+#[tokio::test]
 async fn all_pages_see_the_name_of_the_user_who_drives() {
     let guarded = Guarded::new().await;
     let mut watching = guarded.page(&guarded.login("carl").await).await;

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { pendingStops, stopAllWords, stopCondition, stopWords } from "../../src/page/stopping.js";
+import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "../../src/page/stopping.js";
 
 const vehicle = (changes) => ({ emergency: true, at_rest: true, runaway: false, ...changes });
 
@@ -38,4 +38,9 @@ test("all are stopped only if each of them is measured at rest", () => {
   assert.equal(stopAllWords([one(), one({ at_rest: false, runaway: true })], false), "1 RUNAWAY");
   assert.equal(stopAllWords([], false), "0 vehicles");
   assert.equal(pendingStops([one(), one({ state: "ready" }), one({ state: "ready", presence: "gone" })]), 1);
+});
+
+test("who may not clear the emergency of others reads who can", () => {
+  assert.match(othersWords(false), /Another client.*An administrator can/);
+  assert.match(othersWords(true), /Another client.*only if you know why/);
 });
