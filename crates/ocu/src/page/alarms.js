@@ -1,7 +1,7 @@
 // Which alarms there are: what an operator must hear of while looking elsewhere. Pure: it takes what
 // the page knows, and returns the alarms that have begun since the last time.
 
-import { objects, plain } from "./dom.js";
+import { number, objects, plain } from "./dom.js";
 
 /** How urgent an alarm is; a runaway sounds until it is over or muted. */
 export const URGENT = new Set(["runaway"]);
@@ -38,15 +38,17 @@ export class Alarms {
   #known = new Map();
   #vehicle = null;
   #first = true;
-  /** Whether the page has driven since the last state that was live. */
+  /** Whether this page drove in the last state that was live. */
   #driving = false;
 
   /**
-   * Takes a state with whether it is live, and the list of vehicles; returns the level of the most urgent alarm that has begun, or null. What a page
-   * finds when it opens, or at another vehicle, has begun before: it is shown, and does not sound.
+   * Takes a state with whether it is live, the list of vehicles and the number of this page; returns the
+   * level of the most urgent alarm that has begun, or null. What a page finds when it opens, or at another
+   * vehicle, has begun before: it is shown, and does not sound. That the link is stale concerns the page
+   * that drives, and not those that watch.
    */
-  update(state, live, vehicles) {
-    if (live) this.#driving = state?.drive?.active === true;
+  update(state, live, vehicles, page) {
+    if (live) this.#driving = state?.drive?.active === true && number(page) !== null && state.control?.page === page;
     const vehicle = state?.vehicle?.subsystem ?? null;
     const now = alarmsOf(state, { live, driving: this.#driving, vehicles });
     const isNew = this.#first || vehicle !== this.#vehicle;

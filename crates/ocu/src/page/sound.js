@@ -30,9 +30,9 @@ export class Sound {
     this.#render();
   }
 
-  /** Takes a state with whether it is live, and the list of vehicles. */
-  update(state, live, vehicles) {
-    const begun = this.#alarms.update(state, live, vehicles);
+  /** Takes a state with whether it is live, the list of vehicles and the number of this page. */
+  update(state, live, vehicles, page) {
+    const begun = this.#alarms.update(state, live, vehicles, page);
     if (begun) this.#play(begun);
     else if (this.#alarms.runaway && performance.now() - this.#playedAt > AGAIN) this.#play("runaway");
   }

@@ -59,14 +59,24 @@ test("a runaway of another vehicle sounds", () => {
   assert.equal(alarms.update(state(), true, [{ subsystem: 102, runaway: true }, null]), "runaway");
 });
 
-test("a stale link sounds only while this vehicle is driven, and an emergency is not new after it", () => {
+test("a stale link sounds only while this page drives, and an emergency is not new after it", () => {
   const alarms = new Alarms();
+  const driven = state({}, { drive: { active: true }, control: { page: 3 } });
   alarms.update(state({ emergency: true }), true);
   assert.equal(alarms.update(state({ emergency: true }), false), null);
   assert.equal(alarms.update(state({ emergency: true }), true), null);
-  alarms.update(state({}, { drive: { active: true } }), true);
-  assert.equal(alarms.update(state({}, { drive: { active: true } }), false), "bad");
+  alarms.update(driven, true, [], 3);
+  assert.equal(alarms.update(driven, false, [], 3), "bad");
   assert.equal(alarms.update(state(), false), null, "once");
+});
+
+test("a stale link does not sound on a page that watches another one drive", () => {
+  const driven = state({}, { drive: { active: true }, control: { page: 3 } });
+  for (const page of [4, null, undefined]) {
+    const alarms = new Alarms();
+    alarms.update(driven, true, [], page);
+    assert.equal(alarms.update(driven, false, [], page), null);
+  }
 });
 
 test("hostile values are no alarms and no errors", () => {
