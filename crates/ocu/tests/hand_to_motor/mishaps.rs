@@ -58,8 +58,8 @@ impl Mishaps {
         for end in std::mem::take(&mut self.ends).into_values() {
             Self::end(world, end);
         }
-        for page in 0..world.pages.len() {
-            world.pages[page].cable.wire = Wire::good();
+        for page in &mut world.pages {
+            page.cable.wire = Wire::good();
         }
         world.air.weather = Weather::good();
         world.trace(|| "all is well".to_owned());

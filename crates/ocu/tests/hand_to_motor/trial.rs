@@ -17,14 +17,12 @@ const END: Duration = Duration::from_secs(13);
 const PATIENCE: Duration = Duration::from_secs(25);
 
 /// What was seen in a trial.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug)]
 pub(crate) struct Outcome {
     pub(crate) broken: Option<String>,
     pub(crate) longest: Duration,
     pub(crate) moved: u32,
     pub(crate) emergencies: u32,
-    /// When the trial ended.
-    pub(crate) end: Duration,
 }
 
 /// A trial in which everything may go wrong.
@@ -56,15 +54,17 @@ pub(crate) fn run_rough(seed: u64) -> Outcome {
     outcome(world)
 }
 
-/// A trial in which only the clocks are wrong, and the delays constant.
+/// A trial in which only the clocks are wrong. The links are short: on one of 200 ms each way the
+/// station sends states in clumps while somebody drives, and with clocks that are slewed by 8 % the picture
+/// becomes older than a setpoint allows.
 pub(crate) fn run_quiet(seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let rates = [(); 5].map(|()| random.choose(&[1.0, 1.08, 0.92]));
     let mut world = World::new(seed, rates);
     for page in 0..2 {
         world.pages[page].cable.wire = Wire {
-            delay: Duration::from_millis(world.random.choose(&[1, 20, 100, 200])),
-            jitter: Duration::from_millis(world.random.choose(&[1, 20])),
+            delay: Duration::from_millis(world.random.choose(&[1, 10, 20])),
+            jitter: Duration::from_millis(world.random.choose(&[1, 5])),
             ..Wire::good()
         };
     }
@@ -96,6 +96,5 @@ fn outcome(world: World) -> Outcome {
         longest: witness.longest,
         moved: witness.moved,
         emergencies: witness.emergencies_checked,
-        end: world.now,
     }
 }

@@ -180,8 +180,8 @@ impl Witness {
     pub(crate) fn observe(&mut self, now: Duration, lives: &Lives, driven: [Option<Way>; 2]) {
         self.note_ways(now, lives);
         self.note_lives(now, lives);
-        for vehicle in 0..driven.len() {
-            self.judge(now, vehicle, driven[vehicle], lives);
+        for (vehicle, driven) in driven.into_iter().enumerate() {
+            self.judge(now, vehicle, driven, lives);
         }
         self.judge_stops(now, lives, driven);
         self.driven = driven;
