@@ -352,17 +352,20 @@ mod tests {
         }
     }
 
+    /// What breaks a drive.
+    type Break = fn(&FaultSwitch);
+
     /// Breaks a drive in different ways while the vehicle drives. Each is found; returns the travel of
     /// both sides since then.
     fn breaks<T: Drivetrain + 'static>(
         make: impl Fn(Odometer) -> (Wheels<T>, FaultSwitch),
     ) -> Vec<(f64, f64)> {
-        let faults: [(fn(&FaultSwitch), &str); 3] = [
+        let faults: [(Break, &str); 3] = [
             (|it| it.stick(0.5), "without a command"),
             (|it| it.multiply(-1.0), "the wrong way"),
             (|it| it.multiply(4.0), "faster than commanded"),
         ];
-        let travel_after = |(fault, says): (fn(&FaultSwitch), &str)| {
+        let travel_after = |(fault, says): (Break, &str)| {
             let odometer = Odometer::new(7);
             let (wheels, switch) = make(odometer.clone());
             let mut pilot = Pilot::new(wheels, Frame::default());
