@@ -19,6 +19,7 @@ thread_local! {
 }
 
 /// What to do with a tab.
+#[derive(Clone, Copy)]
 pub(crate) enum Load {
     /// Go on.
     No,

@@ -245,7 +245,7 @@ impl Witness {
             return;
         };
         if self.emergencies[vehicle] {
-            return self.break_rule(now, format!("vehicle {vehicle} moves in emergency"));
+            return self.break_rule(now, &format!("vehicle {vehicle} moves in emergency"));
         }
         let mut reasons = Vec::new();
         for hold in self
@@ -273,7 +273,7 @@ impl Witness {
         }
         reasons.push("no other hand holds it".to_owned());
         let reasons = reasons.join("; ");
-        self.break_rule(now, format!("vehicle {vehicle} moves {way:?}: {reasons}"));
+        self.break_rule(now, &format!("vehicle {vehicle} moves {way:?}: {reasons}"));
     }
 
     /// Without any trouble, whoever holds a vehicle that is ready drives it.
@@ -287,7 +287,7 @@ impl Witness {
         if let Some(hold) = self.holds.iter().find(idle) {
             let (page, begun) = (hold.page, hold.begun);
             let what = format!("page {page} holds vehicle {vehicle} since {begun:.2?}");
-            self.break_rule(now, format!("{what}, and it does not move"));
+            self.break_rule(now, &format!("{what}, and it does not move"));
         }
     }
 
@@ -336,13 +336,13 @@ impl Witness {
                 let (vehicle, late) = (stop.vehicle, now - stop.at);
                 self.break_rule(
                     now,
-                    format!("vehicle {vehicle} moves {late:.2?} after its stop"),
+                    &format!("vehicle {vehicle} moves {late:.2?} after its stop"),
                 );
             }
         }
     }
 
-    fn break_rule(&mut self, now: Duration, what: String) {
+    fn break_rule(&mut self, now: Duration, what: &str) {
         if self.broken.is_none() {
             story::note(now, &format!("BROKEN: {what}"));
             self.broken_at = now;
