@@ -15,8 +15,9 @@
 //!
 //! Peers that restart unnoticed are subject to the other limits on motion, which are longer.
 //!
-//! Junior has a mode for the first version of AS5669 that counts anew before each large message. If
-//! it sends one while it drives, this is taken for a restart, and the vehicle stops.
+//! Junior counts anew before each message of several fragments where it does not detect duplicates, which
+//! FKIE's settings turn off. A component takes that for a restart of its controller, and stops: it cannot
+//! ask who else the controller still is. A client asks the component who its controller is, and goes on.
 
 use std::time::Instant;
 
@@ -107,7 +108,9 @@ impl Counter {
             self.fresh = None;
             return Sameness::Same;
         }
-        if self.is_late(newest, number) {
+        // One that repeats its number, as some do that do not count, says nothing new.
+        let is_repeated = |fresh: Mark| fresh.number == number && fresh.is_recent(now);
+        if self.is_late(newest, number) || self.fresh.is_some_and(is_repeated) {
             return Sameness::Same;
         }
         let before = self.fresh.take().filter(|fresh| fresh.is_recent(now));
@@ -237,6 +240,15 @@ mod tests {
         assert!(!rig.notices_restart([1]));
         rig.now += MEMORY;
         assert!(!rig.notices_restart([2]), "they are far apart");
+    }
+
+    #[test]
+    fn a_number_that_is_repeated_raises_one_doubt() {
+        let mut rig = Rig::after(1000..1200);
+        let found = rig.note_all([0; 40]);
+        let doubts = found.iter().filter(|it| **it == Sameness::Doubtful);
+        assert_eq!(doubts.count(), 1, "{found:?}");
+        assert!(!found.contains(&Sameness::Restarted));
     }
 
     #[test]

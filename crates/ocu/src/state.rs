@@ -51,6 +51,8 @@ pub struct FleetVehicle {
     pub presence: &'static str,
     /// Management state of its primitive driver, or of the part that stands in for it.
     pub state: Option<&'static str>,
+    /// Whether this station has put it in emergency, and repeats that until all parts confirm it.
+    pub stop_set: bool,
     /// Measured forward speed in metres per second; `null` without a fresh measurement.
     pub speed: Option<f64>,
     /// Whether it is at rest by that measurement; `null` without one.
@@ -149,6 +151,8 @@ pub struct VehicleState {
     pub emergency: bool,
     /// Whether the emergency is one that other clients have set, or the vehicle's own.
     pub emergency_of_others: bool,
+    /// Whether this station has put it in emergency, and repeats that until all parts confirm it.
+    pub stop_set: bool,
     /// Whether the vehicle is at rest by its measured velocity; `null` without a fresh measurement.
     pub at_rest: Option<bool>,
     /// Whether the vehicle moves in an emergency and does not slow down.

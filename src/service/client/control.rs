@@ -269,6 +269,10 @@ impl Controls {
             return;
         };
         match (control.watch.note(now, message), control.state) {
+            // Its numbers alone do not tell: it is asked who its controller is.
+            (Sameness::Restarted, State::Held) if control.watch.incarnation().is_none() => {
+                control.next = now;
+            }
             (Sameness::Restarted, State::Held) => {
                 let news = control.lose(ControlLost::Restarted);
                 self.news.extend(news.map(|news| (control.id, news)));

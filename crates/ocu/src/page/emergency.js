@@ -1,25 +1,30 @@
 // Emergency stop of the selected vehicle and of all: one touch or key, from anywhere, in any
-// condition. The request is repeated until the vehicles report their emergency, over reconnections
-// as well; that they have stopped shows in their speed. Clearing it takes two.
+// condition. Each stop is repeated until the station repeats it itself and the vehicle reports its
+// emergency, over reconnections and other vehicles as well; that it has stopped shows in its speed.
+// Clearing it takes two.
 
-import { get, mark, say, show, toast } from "./dom.js";
+import { get, mark, objects, say, show, toast } from "./dom.js";
 import { StopLink } from "./stop_link.js";
 import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
 const CLEAR_TEXT = "The vehicle can move again once a client resumes and commands it. Check it first.";
+const MOST = 256;
 const touch = matchMedia("(hover: none)");
 
 export class Emergency {
   #link;
   #stops;
-  /** Whether the operator has stopped the vehicle and it has not confirmed that yet. */
-  #wanted = false;
+  /** The vehicles that the operator has stopped, and whose stop is not confirmed yet. */
+  #wanted = new Set();
+  /** Whether the operator has pressed a stop before the page knew a vehicle. */
+  #wantedFirst = false;
   /** How far the vehicle's stop is; null while it reports no emergency. */
   #condition = null;
   #speed = null;
   #refusal = "";
-  /** The same for all vehicles. */
   #wantedAll = false;
+  /** How many requests to clear are not answered: what the station says meanwhile may be over with them. */
+  #clearings = 0;
   #vehicles = [];
   /** Whether the station stops vehicles that join. */
   #latched = false;
@@ -38,6 +43,9 @@ export class Emergency {
     this.#stops.addEventListener("refused", ({ detail }) => this.#refuse(detail));
     link.addEventListener("hello", () => this.#stops.start());
     link.addEventListener("barred", () => this.#stops.close());
+    // What has just arrived was said after the stop, but for what was under way.
+    link.addEventListener("state", ({ detail: { vehicle } }) => vehicle && this.#confirm(vehicle, vehicle.emergency === true));
+    link.addEventListener("fleet", ({ detail }) => this.#confirmAll(detail));
     this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
     get("estop-all").addEventListener("click", () => this.stopAll());
@@ -53,26 +61,55 @@ export class Emergency {
 
   /** Stops the vehicle. */
   stop() {
-    this.#stop("emergency");
+    this.#press(() => {
+      const { vehicle } = this.#link;
+      if (vehicle === null) this.#wantedFirst = true;
+      else this.#want(vehicle);
+    });
   }
 
   /** Stops all vehicles. */
   stopAll() {
-    this.#wantedAll = true;
-    this.#stop("emergency_all");
+    this.#press(() => {
+      this.#wantedAll = true;
+      this.#stops.stopAll();
+    });
   }
 
-  #stop(type) {
-    if (this.#barred) {
-      [this.#wanted, this.#wantedAll] = [false, false];
-      return this.#unbar();
-    }
+  #press(stop) {
     this.#closeSheet();
-    this.#wanted = true;
     this.#refusal = "";
-    this.#send(type);
+    // Also if the page is barred: the station decides.
+    stop();
+    if (this.#barred) this.#unbar();
     this.#render();
     navigator.vibrate?.(80);
+  }
+
+  #want(vehicle) {
+    this.#wanted.add(vehicle);
+    this.#stops.stop(vehicle);
+  }
+
+  #forget(vehicle) {
+    this.#wanted.delete(vehicle);
+    this.#stops.cancel(vehicle);
+  }
+
+  #forgetAll() {
+    this.#wantedAll = false;
+    this.#stops.cancel("all");
+  }
+
+  /** Takes what the station says of a vehicle, and whether that reports its emergency. */
+  #confirm({ subsystem, stop_set: isSet }, isStopped) {
+    if (this.#clearings === 0 && isSet === true && isStopped) this.#forget(subsystem);
+  }
+
+  #confirmAll({ vehicles, all_stopped: isLatched }) {
+    const known = objects(vehicles, MOST);
+    for (const vehicle of known) this.#confirm(vehicle, vehicle.state === "emergency");
+    if (this.#clearings === 0 && isLatched === true && pendingStops(known) === 0) this.#forgetAll();
   }
 
   /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. With
@@ -81,7 +118,9 @@ export class Emergency {
     const field = event.target instanceof HTMLInputElement;
     if (event.key !== "Escape" && !(event.code === "Space" && !field)) return false;
     event.preventDefault();
-    if (!event.repeat) event.shiftKey ? this.stopAll() : this.stop();
+    // A menu may have taken the press itself.
+    const isDone = this.#condition !== null || this.#isWanted;
+    if (!event.repeat || !isDone) event.shiftKey ? this.stopAll() : this.stop();
     return true;
   }
 
@@ -97,15 +136,16 @@ export class Emergency {
     this.#ofOthers = live && state?.vehicle?.emergency_of_others === true;
     this.#condition = stopCondition(state?.vehicle, live);
     this.#speed = state?.vehicle?.velocity?.x;
-    if (this.#condition) this.#wanted = false;
-    if (pendingStops(vehicles) === 0) this.#wantedAll = false;
-    if (!this.#wanted && !this.#wantedAll) this.#stops.cancel();
+    if (this.#wantedFirst && this.#link.vehicle !== null) {
+      this.#wantedFirst = false;
+      this.#want(this.#link.vehicle);
+    }
     this.#render();
   }
 
-  #send(type) {
-    if (type === "emergency_all") this.#stops.stopAll();
-    else if (this.#link.vehicle !== null) this.#stops.stop(this.#link.vehicle);
+  /** Whether a stop that concerns the vehicle is not confirmed yet. */
+  get #isWanted() {
+    return this.#wantedAll || this.#wantedFirst || this.#wanted.has(this.#link.vehicle);
   }
 
   #refuse(reason) {
@@ -114,7 +154,7 @@ export class Emergency {
   }
 
   #render() {
-    const how = this.#condition ?? (this.#wanted ? "wanted" : this.#barred ? "barred" : "ready");
+    const how = this.#condition ?? (this.#isWanted ? "wanted" : this.#barred ? "barred" : "ready");
     document.body.dataset.emergency = how;
     const [word, detail] = this.#condition
       ? stopWords(this.#condition, this.#speed)
@@ -156,7 +196,16 @@ export class Emergency {
 
   async #clear(request) {
     this.#closeSheet();
+    // The operator's last word counts.
+    if (request.type === "emergency_all") {
+      for (const vehicle of [...this.#wanted]) this.#forget(vehicle);
+      this.#forgetAll();
+    } else {
+      this.#forget(this.#link.vehicle);
+    }
+    this.#clearings += 1;
     const reason = await this.#link.ask(request);
+    this.#clearings -= 1;
     if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);
   }

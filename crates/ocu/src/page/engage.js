@@ -15,6 +15,9 @@ export class Engage {
   /** When control or Resume was asked for last; null while the button is not at work. */
   #asked = null;
   #resumed = false;
+  /** The vehicle that the page shows, and the one that was asked for. */
+  #shown = null;
+  #vehicle = null;
   /** Whether a mission is being stopped first. */
   #isTakingOver = false;
 
@@ -35,6 +38,8 @@ export class Engage {
     const { held, wanted, asking } = state?.control ?? {};
     const driver = part(state, "primitive_driver");
     const mode = driver?.state;
+    this.#shown = state?.vehicle?.subsystem ?? null;
+    if (this.#asked !== null && this.#shown !== this.#vehicle) this.#end("");
     if (this.#asked !== null && this.#isTakingOver) this.#stopMission(operable, obstacle);
     else if (this.#asked !== null) this.#go(Boolean(held || wanted || asking), held && driver?.ours, mode, operable, obstacle);
     const canTakeOver = Boolean(operable && held && !obstacle && (this.#mission.drives || this.#isTakingOver));
@@ -50,7 +55,7 @@ export class Engage {
   }
 
   #begin(request) {
-    [this.#asked, this.#resumed] = [performance.now(), false];
+    [this.#asked, this.#resumed, this.#vehicle] = [performance.now(), false, this.#shown];
     this.#request(request);
   }
 

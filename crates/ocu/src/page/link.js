@@ -14,6 +14,10 @@ const DEAD = 10_000;
 const BACKLOG = 16_384;
 /** A state is not waited for to be drawn longer than this. */
 const DRAWN = 500;
+/** Answers of this page itself: the station has not spoken. */
+const UNSENT = "No connection: not sent.";
+const UNANSWERED = "No answer from the operator's node.";
+const LOST = "The connection was lost before an answer arrived.";
 const KEY = "jaus-token";
 const VEHICLE = "jaus-vehicle";
 
@@ -122,11 +126,11 @@ export class Link extends EventTarget {
 
   /** Sends a request; resolves to null when it is done, to what was asked for, or to the reason why not. */
   ask(request) {
-    if (!this.open) return Promise.resolve("No connection: not sent.");
+    if (!this.open) return Promise.resolve(UNSENT);
     const id = ++this.#ids;
     this.#transmit({ vehicle: this.#vehicle, ...request, id });
     return new Promise((resolve) => {
-      const timer = setTimeout(() => this.#answer(id, "No answer from the operator's node."), 5_000);
+      const timer = setTimeout(() => this.#answer(id, UNANSWERED), 5_000);
       this.#waiting.set(id, { resolve, timer });
     });
   }
@@ -153,7 +157,7 @@ export class Link extends EventTarget {
     if (reason === null) {
       this.#token = token;
       sessionStorage.setItem(KEY, token);
-    } else if (token === this.#token) {
+    } else if (token === this.#token && ![UNSENT, UNANSWERED, LOST].includes(reason)) {
       this.#token = "";
       sessionStorage.removeItem(KEY);
     }
@@ -299,7 +303,7 @@ export class Link extends EventTarget {
     const socket = this.#socket;
     this.#socket = null;
     if (socket && socket.readyState !== WebSocket.CLOSED) socket.close();
-    for (const id of [...this.#waiting.keys()]) this.#answer(id, "The connection was lost before an answer arrived.");
+    for (const id of [...this.#waiting.keys()]) this.#answer(id, LOST);
     this.#retryAt = performance.now() + this.#pause;
     this.#retryTimer = setTimeout(() => this.#connect(), this.#pause);
     this.#pause = Math.min(this.#pause * 1.7, LONGEST_PAUSE);

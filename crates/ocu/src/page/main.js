@@ -2,7 +2,7 @@
 // server.
 
 import { Account } from "./account.js";
-import { get, mark, plain, say, show, toast, typing } from "./dom.js";
+import { get, mark, number, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
 import { Engage } from "./engage.js";
@@ -54,7 +54,8 @@ link.addEventListener("hello", async ({ detail }) => {
   authority = detail.authority;
   if (detail.token_needed && !trusted && link.token) await offer(link.token);
   else show(get("token-sheet"), detail.token_needed && !trusted && !(watchable && watching()));
-  link.settled = true;
+  // Another connection may have said hello meanwhile.
+  if (link.page === number(detail.page)) link.settled = true;
   render();
 });
 link.addEventListener("state", ({ detail }) => {
@@ -192,7 +193,7 @@ async function offer(token) {
   trusted = reason === null;
   show(get("token-sheet"), !trusted);
   if (!trusted) {
-    say(get("token-text"), `The token was rejected: ${plain(reason, 200)}`);
+    say(get("token-text"), `The token was not accepted: ${plain(reason, 200)}`);
     get("token").focus();
   }
   render();

@@ -1,11 +1,15 @@
 // Connections that carry nothing but stops, kept open beside the one of link.js. A stop is sent on
 // all of them at once, so that it waits for no other frame and for no lost packet of another
-// connection. It is repeated until it is cancelled, over reconnections as well.
+// connection. Each is repeated until it is cancelled, over reconnections as well.
 
 const FIRST_PAUSE = 250;
 const LONGEST_PAUSE = 4_000;
 /** The station says something every 10 s, which a slow link delays. A connection that is silent for so long is given up. */
 const DEAD = 25_000;
+/** A connection that does not open within this is given up: browsers open one at a time, and others wait for it. */
+const SLOWEST = 8_000;
+/** What has been silent for longer than the station's interval does not outlive a new connection of link.js. */
+const SILENT = 11_000;
 /** Pauses between the repetitions of a stop in milliseconds; the last one goes on. */
 const REPEATS = [50, 100, 200, 500];
 /** With one packet in three lost, two connections bring a stop through in time. */
@@ -15,8 +19,8 @@ const CONNECTIONS = 2;
 export class StopLink extends EventTarget {
   #link;
   #channels;
-  /** The stop that is repeated, as a frame here and as a request of `link`; null if there is none. */
-  #stop = null;
+  /** The stops that are repeated, by subsystem or `all`: each as a frame here and as a request of `link`. */
+  #stops = new Map();
   #timer = 0;
   #repeats = 0;
 
@@ -27,7 +31,8 @@ export class StopLink extends EventTarget {
     const events = {
       connect,
       token: () => link.token,
-      opened: (channel) => this.#stop && channel.send(this.#stop.frame),
+      opened: (channel) => channel.send(this.#frames),
+      isPressing: () => this.#stops.size > 0,
       refused: (reason) => this.dispatchEvent(new CustomEvent("refused", { detail: reason })),
     };
     this.#channels = Array.from({ length: CONNECTIONS }, () => new Channel(events));
@@ -50,34 +55,37 @@ export class StopLink extends EventTarget {
 
   /** Stops a vehicle until `cancel`. */
   stop(subsystem) {
-    // Stopping all includes every vehicle.
-    if (this.#stop?.frame === "stop-all") return this.stopAll();
-    this.#begin(`stop ${subsystem}`, { type: "emergency", on: true, vehicle: subsystem });
+    this.#begin(subsystem, `stop ${subsystem}`, { type: "emergency", on: true, vehicle: subsystem });
   }
 
   /** Stops all vehicles until `cancel`. */
   stopAll() {
-    this.#begin("stop-all", { type: "emergency_all", on: true });
+    this.#begin("all", "stop-all", { type: "emergency_all", on: true });
   }
 
-  /** Ends the repetitions: the vehicles have confirmed the stop. */
-  cancel() {
+  /** Ends the repetitions for a subsystem or `all`: the stop is confirmed. */
+  cancel(target) {
+    this.#stops.delete(target);
+    if (this.#stops.size === 0) clearTimeout(this.#timer);
+  }
+
+  get #frames() {
+    return [...this.#stops.values()].map(({ frame }) => frame);
+  }
+
+  #begin(target, frame, request) {
     clearTimeout(this.#timer);
-    this.#stop = null;
-  }
-
-  #begin(frame, request) {
-    this.cancel();
-    this.#stop = { frame, request };
+    this.#stops.set(target, { frame, request });
     this.#repeats = 0;
     this.#repeat();
   }
 
   #repeat() {
-    const { frame, request } = this.#stop;
-    const sent = this.#channels.map((channel) => channel.send(frame));
+    const sent = this.#channels.map((channel) => channel.send(this.#frames));
     // The other connection comes second: it may be busy, and this one is enough on a good network.
-    if (!sent.includes(true) || this.#repeats > 0) this.#link.send(request);
+    if (!sent.includes(true) || this.#repeats > 0) {
+      for (const { request } of this.#stops.values()) this.#link.send(request);
+    }
     const pause = REPEATS[Math.min(this.#repeats++, REPEATS.length - 1)];
     this.#timer = setTimeout(() => this.#repeat(), pause);
   }
@@ -89,12 +97,15 @@ class Channel {
   #socket = null;
   #pause = FIRST_PAUSE;
   #timer = 0;
+  #heardAt = 0;
 
   constructor(events) {
     this.#events = events;
   }
 
+  /** Opens it, or again if it is open and silent. */
   start() {
+    if (this.open && performance.now() - this.#heardAt > SILENT) this.close();
     if (this.#socket) return;
     clearTimeout(this.#timer);
     this.#pause = FIRST_PAUSE;
@@ -112,47 +123,53 @@ class Channel {
     return this.#socket?.readyState === 1;
   }
 
-  /** Sends a frame unless an earlier one has not left the browser; false if it cannot be sent. */
-  send(frame) {
+  /** Sends frames unless earlier ones have not left the browser; false if they cannot be sent. */
+  send(frames) {
     if (!this.open) return false;
-    if (this.#socket.bufferedAmount === 0) this.#socket.send(frame);
+    if (this.#socket.bufferedAmount === 0) frames.forEach((frame) => this.#socket.send(frame));
     return true;
   }
 
   #open() {
     const socket = this.#events.connect();
     this.#socket = socket;
-    this.#watch(socket);
+    this.#watch(socket, SLOWEST);
     socket.addEventListener("open", () => {
       if (socket !== this.#socket) return;
       this.#pause = FIRST_PAUSE;
-      this.#watch(socket);
+      this.#hear(socket);
       const token = this.#events.token();
       if (token) socket.send(`token ${token}`);
       this.#events.opened(this);
     });
     socket.addEventListener("message", ({ data }) => {
       if (socket !== this.#socket) return;
-      this.#watch(socket);
+      this.#hear(socket);
       if (String(data).startsWith("no ")) this.#events.refused(String(data).slice(3, 200));
     });
     socket.addEventListener("close", () => socket === this.#socket && this.#retry());
   }
 
+  #hear(socket) {
+    this.#heardAt = performance.now();
+    this.#watch(socket, DEAD);
+  }
+
   /** Gives the connection up unless the station says something in time. */
-  #watch(socket) {
+  #watch(socket, patience) {
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => {
       this.#socket = null;
       socket.close();
       this.#retry();
-    }, DEAD);
+    }, patience);
   }
 
   #retry() {
     clearTimeout(this.#timer);
     this.#socket = null;
-    this.#timer = setTimeout(() => this.#open(), this.#pause);
+    const pause = this.#events.isPressing() ? FIRST_PAUSE : this.#pause;
+    this.#timer = setTimeout(() => this.#open(), pause);
     this.#pause = Math.min(this.#pause * 2, LONGEST_PAUSE);
   }
 }

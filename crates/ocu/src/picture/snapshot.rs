@@ -49,6 +49,7 @@ impl Picture {
             stale: self.stale(now),
             emergency: if emergency_wanted { all } else { any },
             emergency_of_others: any && !emergency_wanted && !emergency_clearing,
+            stop_set: emergency_wanted,
             at_rest: self.at_rest(now),
             runaway: self.is_runaway(now),
             held: self.hold_reason(now),
@@ -57,12 +58,12 @@ impl Picture {
     }
 
     /// The vehicle in the list of vehicles, with the operator of this station who has it. The flags
-    /// state whether the station controls it, and is requested to hand it over.
+    /// state whether the station controls it, is requested to hand it over, and has put it in emergency.
     pub(crate) fn fleet_state(
         &self,
         now: Instant,
         driver: String,
-        (held, requested): (bool, bool),
+        (held, requested, stop_set): (bool, bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
         let status = principal.and_then(|part| part.status);
@@ -83,6 +84,7 @@ impl Picture {
             driver,
             presence,
             state: status.map(|known| state_name(known.what)),
+            stop_set,
             speed: self.fresh_velocity(now).and_then(|it| it.x),
             at_rest: self.at_rest(now),
             runaway: self.is_runaway(now),

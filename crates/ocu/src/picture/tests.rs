@@ -419,7 +419,7 @@ fn a_vehicle_that_keeps_moving_in_emergency_is_a_runaway_while_its_speed_is_know
     assert!(shown(&picture, start + ms(1000)).runaway);
     assert!(
         picture
-            .fleet_state(start + ms(1000), String::new(), (false, false))
+            .fleet_state(start + ms(1000), String::new(), (false, false, false))
             .runaway
     );
     assert!(!shown(&picture, start + ms(2000)).runaway);

@@ -563,7 +563,8 @@ impl Writer<'_> {
             version: VERSION,
             page: self.page.0,
             secret: self.secret.as_ref().map(Token::reveal),
-            token_needed: admission.gate.token().is_some(),
+            // Most pages have shown it with their first request.
+            token_needed: admission.gate.token().is_some() && !self.visitor.may(UserRole::Drive),
             watch: admission.gate.lets_watch(),
             operator: admission.operator.to_string(),
             authority: admission.authority,

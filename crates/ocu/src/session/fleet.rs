@@ -140,7 +140,8 @@ impl Fleet {
         named.or_else(|| self.vehicles.keys().next()).copied()
     }
 
-    /// Drops vehicles that have stayed away, and those that turned out to be none.
+    /// Drops vehicles that have stayed away, and those that turned out to be none; not those that an
+    /// operator has stopped, which the station stops again when they come back.
     pub(super) fn drop_absent(&mut self, shown: &BTreeSet<u16>) {
         let Self {
             chosen, directory, ..
@@ -149,7 +150,8 @@ impl Fleet {
             let known = directory.subsystem(*number);
             let is_other = known.is_some_and(|it| !role::is_vehicle(it));
             let is_absent = vehicle.picture.is_empty() || is_other;
-            !is_absent || shown.contains(number) || chosen.contains(number)
+            let is_kept = shown.contains(number) || chosen.contains(number);
+            !is_absent || is_kept || vehicle.alarm.is_wanted()
         });
     }
 

@@ -179,7 +179,8 @@ impl Vehicle {
         let requested = self.handover.is_requested();
         let owner = self.ownership.owner();
         let driver = owner.map_or_else(String::new, ToString::to_string);
-        self.picture.fleet_state(now, driver, (held, requested))
+        let flags = (held, requested, self.alarm.is_wanted());
+        self.picture.fleet_state(now, driver, flags)
     }
 
     /// Asks a part for the round trip.

@@ -26,7 +26,7 @@ globalThis.document = {
 };
 const { Engage } = await import("../../src/page/engage.js");
 
-const vehicle = (state) => ({ parts: [{ role: "primitive_driver", state, ours: true }] });
+const vehicle = (state, subsystem = 101) => ({ subsystem, parts: [{ role: "primitive_driver", state, ours: true }] });
 const free = { control: {}, vehicle: vehicle("standby") };
 const held = (state) => ({ control: { held: true, wanted: true }, vehicle: vehicle(state) });
 
@@ -69,6 +69,16 @@ test("a connection that stays lost ends it: the vehicle does not become ready wh
   engage.update(held("ready"), true, "");
   assert.deepEqual(asked, ["control"]);
   assert.ok(!isReady());
+});
+
+test("another vehicle is not taken: the press meant the one that was shown", async () => {
+  const { engage, asked } = pressed();
+  await null;
+  const other = { control: { held: true, wanted: true }, vehicle: vehicle("standby", 102) };
+  engage.update(other, true, "");
+  engage.update(other, true, "");
+  await null;
+  assert.deepEqual(asked, ["control"]);
 });
 
 test("an obstacle ends it at once", async () => {

@@ -47,7 +47,7 @@ function page() {
   const emergency = new Emergency(link, () => {});
   const update = (vehicle, allStopped, clears = true) => {
     const state = { vehicle: { ...vehicle, emergency: vehicle.state === "emergency" } };
-    emergency.update(state, true, { vehicles: [vehicle], allStopped }, "", clears);
+    emergency.update(state, true, { vehicles: [vehicle], allStopped }, "", { clears, clearsAny: false });
   };
   return { update, requests };
 }
@@ -70,6 +70,8 @@ test("the latch is cleared as it was set, by who may clear emergencies", () => {
     get(button).click();
     assert.deepEqual(requests, [{ type: "emergency_all", on: false }], button);
   }
+  page().update(stopped, true, true);
+  assert.ok(!get("latch-clear").disabled);
   page().update(stopped, true, false);
   assert.ok(get("latch-clear").disabled);
 });

@@ -51,7 +51,7 @@ test("a stop goes out on every connection at once, and is repeated until it is c
   mock.timers.tick(100);
   assert.deepEqual(sent(), [Array(2).fill("stop 101"), Array(2).fill("stop 101")]);
   assert.deepEqual(requests, ["emergency", "emergency"]);
-  stops.cancel();
+  stops.cancel(101);
   mock.timers.tick(3_000);
   assert.deepEqual(sent(), [[], []]);
 });
@@ -99,12 +99,49 @@ test("the token comes first, and a refusal is told", () => {
   assert.equal(reason, "vehicle 7 is unknown");
 });
 
-test("a stop of all is not replaced by that of one vehicle", () => {
-  const { stops, sockets, sent } = rig();
+test("each stop is repeated until it is confirmed itself", () => {
+  const { stops, sockets, requests, sent } = rig();
   sockets[0].open();
-  stops.stopAll();
   stops.stop(101);
-  assert.deepEqual(sent()[0], ["stop-all", "stop-all"]);
+  stops.stop(102);
+  stops.stopAll();
+  sent();
+  requests.splice(0);
+  stops.cancel(102);
+  mock.timers.tick(50);
+  assert.deepEqual(sent()[0], ["stop 101", "stop-all"]);
+  assert.deepEqual(requests, ["emergency", "emergency_all"]);
+  stops.cancel("all");
+  mock.timers.tick(100);
+  assert.deepEqual(sent()[0], ["stop 101"]);
+  stops.cancel(101);
+  mock.timers.tick(3_000);
+  assert.deepEqual(sent()[0], []);
+});
+
+test("a connection that does not open keeps the others waiting for 8 s at most, and a stop for a quarter of a second", () => {
+  const { stops, sockets } = rig();
+  mock.timers.tick(8_000);
+  assert.deepEqual(sockets.map(({ readyState }) => readyState), [3, 3]);
+  mock.timers.tick(250);
+  stops.stop(101);
+  mock.timers.tick(8_000);
+  mock.timers.tick(250);
+  assert.equal(sockets.length, 6);
+});
+
+test("a connection that is open and silent is opened again with the other one", () => {
+  let now = 0;
+  const clock = mock.method(performance, "now", () => now);
+  const { stops, sockets } = rig();
+  sockets.forEach((socket) => socket.open());
+  now = 5_000;
+  sockets[0].say("");
+  now = 12_000;
+  stops.start();
+  assert.equal(sockets.length, 3, "the one that was heard stays");
+  assert.equal(sockets[1].readyState, 3);
+  clock.mock.restore();
 });
 
 test("a frame takes 32 octets at most", () => {

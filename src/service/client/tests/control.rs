@@ -221,14 +221,17 @@ fn deny_for(bench: &mut Bench, duration: Duration, controller: JausId) {
             bench.hear(PEER, &confirm(1));
         }
         for _ in bench.sent::<QueryControl>() {
-            let report = ReportControl {
-                subsystem_id: controller.subsystem(),
-                node_id: controller.node(),
-                component_id: controller.component(),
-                ..ReportControl::default()
-            };
-            bench.hear(PEER, &report);
+            bench.hear(PEER, &controlled_by(controller));
         }
+    }
+}
+
+fn controlled_by(controller: JausId) -> ReportControl {
+    ReportControl {
+        subsystem_id: controller.subsystem(),
+        node_id: controller.node(),
+        component_id: controller.component(),
+        ..ReportControl::default()
     }
 }
 
@@ -459,14 +462,15 @@ fn control_is_lost_when_the_peer_is_another_incarnation() {
     );
 }
 
-/// A peer without the service Incarnation answers the queries of its status for a while.
-fn report_status_for(bench: &mut Bench, duration: Duration) {
+/// A peer without the service Incarnation, under control of `controller`, answers for a while.
+fn answer_for(bench: &mut Bench, duration: Duration, controller: JausId) {
     let end = bench.now + duration;
     while bench.now < end {
         bench.run_ms(10);
         for (_, payload) in std::mem::take(&mut bench.sent) {
             match code_of(&payload) {
                 Some(RequestControl::CODE) => bench.hear(PEER, &confirm(0)),
+                Some(QueryControl::CODE) => bench.hear(PEER, &controlled_by(controller)),
                 Some(QueryStatus::CODE) => bench.hear(PEER, &status(1)),
                 _ => {}
             }
@@ -474,15 +478,21 @@ fn report_status_for(bench: &mut Bench, duration: Duration) {
     }
 }
 
-#[test]
-fn control_is_lost_within_half_a_second_when_the_numbers_of_a_foreign_peer_begin_anew() {
+/// Control of such a peer, whose numbers begin anew after 9 s.
+fn held_until_numbers_begin_anew() -> Bench {
     let (mut bench, _) = held(5);
     bench.number = Some(30);
-    report_status_for(&mut bench, Duration::from_secs(9));
+    answer_for(&mut bench, Duration::from_secs(9), CLIENT);
     assert_eq!(news(&mut bench), [ControlNews::Status(1)]);
-    // Its new process says that it is ready, too.
     bench.number = Some(1);
-    report_status_for(&mut bench, Duration::from_millis(500));
+    bench
+}
+
+#[test]
+fn control_is_lost_within_half_a_second_when_the_numbers_of_a_foreign_peer_begin_anew() {
+    let mut bench = held_until_numbers_begin_anew();
+    // Its new process says that it is ready, too.
+    answer_for(&mut bench, Duration::from_millis(500), OTHER);
     assert_eq!(
         news(&mut bench),
         [ControlNews::Lost(ControlLost::Restarted)]
@@ -490,10 +500,17 @@ fn control_is_lost_within_half_a_second_when_the_numbers_of_a_foreign_peer_begin
 }
 
 #[test]
+fn control_is_kept_when_a_foreign_peer_counts_anew_and_knows_its_client() {
+    let mut bench = held_until_numbers_begin_anew();
+    answer_for(&mut bench, Duration::from_secs(20), CLIENT);
+    assert_eq!(news(&mut bench), []);
+}
+
+#[test]
 fn control_is_kept_when_the_numbers_of_a_foreign_peer_wrap() {
     let (mut bench, _) = held(5);
     bench.number = Some(65_500);
-    report_status_for(&mut bench, Duration::from_secs(20));
+    answer_for(&mut bench, Duration::from_secs(20), CLIENT);
     assert!(bench.number.is_some_and(|number| number < 1000));
     assert_eq!(news(&mut bench), [ControlNews::Status(1)]);
 }

@@ -1,0 +1,190 @@
+// A stop is repeated until the station has it, whatever happens meanwhile.
+
+import assert from "node:assert/strict";
+import test, { mock } from "node:test";
+
+class Element extends EventTarget {
+  hidden = false;
+  disabled = false;
+  textContent = "";
+  hasAttribute = () => false;
+  getAttribute = () => null;
+  setAttribute() {}
+  removeAttribute() {}
+  contains = () => false;
+  focus() {}
+  append() {}
+  remove() {}
+  children = [];
+  dataset = {};
+}
+
+class Socket extends EventTarget {
+  static all = [];
+  readyState = 1;
+  bufferedAmount = 0;
+  sent = [];
+  constructor() {
+    super();
+    Socket.all.push(this);
+  }
+  send(frame) {
+    this.sent.push(frame);
+  }
+  close() {
+    this.readyState = 3;
+  }
+}
+
+const elements = new Map();
+const get = (id) => elements.get(id) ?? elements.set(id, new Element()).get(id);
+Object.assign(globalThis, {
+  document: { getElementById: get, createElement: () => new Element(), body: { dataset: {} } },
+  matchMedia: () => ({ matches: false }),
+  location: { protocol: "http:", host: "station" },
+  HTMLInputElement: class {},
+  WebSocket: Socket,
+});
+
+Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });
+
+const { Emergency } = await import("../../src/page/emergency.js");
+
+const clears = { clears: true, clearsAny: false };
+
+function page({ vehicle = 101, barred = "" } = {}) {
+  mock.timers.enable({ apis: ["setTimeout"] });
+  elements.clear();
+  Socket.all = [];
+  let answer;
+  const unbarred = [];
+  const link = Object.assign(new EventTarget(), {
+    open: true,
+    vehicle,
+    send() {},
+    ask: () => new Promise((resolve) => (answer = resolve)),
+  });
+  const emergency = new Emergency(link, () => unbarred.push(1));
+  link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
+  const state = (changes) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes } });
+  const update = (shown) => emergency.update(shown, true, { vehicles: [], allStopped: false }, barred, clears);
+  update(null);
+  return {
+    link,
+    emergency,
+    unbarred,
+    update: () => update(null),
+    /** A state arrives. */
+    hear: (changes) => {
+      const detail = state(changes);
+      link.dispatchEvent(new CustomEvent("state", { detail }));
+      update(detail);
+    },
+    /** A list of vehicles arrives. */
+    hearFleet: (vehicles, isLatched = false) =>
+      link.dispatchEvent(new CustomEvent("fleet", { detail: { vehicles, all_stopped: isLatched } })),
+    answer: async (reason) => {
+      answer(reason);
+      await new Promise((resolve) => setImmediate(resolve));
+    },
+    /** What is sent in the next second. */
+    repeated: () => {
+      Socket.all.forEach(({ sent }) => sent.splice(0));
+      for (let round = 0; round < 4; round++) mock.timers.tick(500);
+      return [...new Set(Socket.all.flatMap(({ sent }) => sent))].sort();
+    },
+  };
+}
+
+test.afterEach(() => mock.timers.reset());
+
+test("a page that is barred sends its stop all the same, and asks for the token", () => {
+  const { emergency, unbarred, repeated } = page({ barred: "enter the token to use it" });
+  emergency.stop();
+  assert.deepEqual(repeated(), ["stop 101"]);
+  assert.equal(unbarred.length, 1);
+});
+
+test("an emergency that others have set does not confirm the operator's own stop", () => {
+  const { emergency, hear, repeated } = page();
+  hear({ emergency: true });
+  emergency.stop();
+  hear({ emergency: true });
+  assert.deepEqual(repeated(), ["stop 101"]);
+  hear({ emergency: false, stop_set: true });
+  assert.deepEqual(repeated(), ["stop 101"], "the vehicle has not confirmed it");
+  hear({ emergency: true, stop_set: true });
+  assert.deepEqual(repeated(), []);
+});
+
+test("an old picture confirms nothing", () => {
+  const { emergency, hear, update, repeated } = page();
+  hear({ emergency: true, stop_set: true });
+  emergency.stop();
+  update();
+  assert.deepEqual(repeated(), ["stop 101"]);
+});
+
+test("a stop after one's own clearing outlives it", async () => {
+  const { emergency, hear, answer, repeated } = page();
+  hear({ emergency: true, stop_set: true });
+  get("clear-yes").dispatchEvent(new Event("click"));
+  emergency.stop();
+  hear({ emergency: true, stop_set: true });
+  assert.deepEqual(repeated(), ["stop 101"], "the clearing is still under way");
+  await answer(null);
+  hear({ emergency: false });
+  assert.deepEqual(repeated(), ["stop 101"]);
+});
+
+test("clearing ends the repetitions of an earlier stop", () => {
+  const { emergency, repeated } = page();
+  emergency.stop();
+  get("clear-yes").dispatchEvent(new Event("click"));
+  assert.deepEqual(repeated(), []);
+});
+
+test("each vehicle is stopped for itself, whichever the page shows", () => {
+  const { link, emergency, hear, hearFleet, repeated } = page();
+  emergency.stop();
+  link.vehicle = 102;
+  hear({ subsystem: 102, emergency: true, stop_set: true });
+  assert.deepEqual(repeated(), ["stop 101"]);
+  emergency.stop();
+  assert.deepEqual(repeated(), ["stop 101", "stop 102"]);
+  hearFleet([{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }]);
+  assert.deepEqual(repeated(), ["stop 102"]);
+});
+
+test("a stop that was pressed before the page knew a vehicle is sent when it does", () => {
+  const { link, emergency, update, repeated } = page({ vehicle: null });
+  emergency.stop();
+  assert.deepEqual(repeated(), []);
+  link.vehicle = 101;
+  update();
+  assert.deepEqual(repeated(), ["stop 101"]);
+});
+
+test("a stop of all is confirmed by the latch, and not by vehicles that are silent or already stopped", () => {
+  const { emergency, hearFleet, repeated } = page();
+  const known = [
+    { subsystem: 101, state: "emergency", presence: "present" },
+    { subsystem: 102, state: "ready", presence: "silent" },
+  ];
+  emergency.stopAll();
+  hearFleet(known);
+  hearFleet([]);
+  assert.deepEqual(repeated(), ["stop-all"]);
+  hearFleet(known, true);
+  assert.deepEqual(repeated(), []);
+});
+
+test("a key whose first press the page did not see stops by its repeats", () => {
+  const { emergency, hear, repeated } = page();
+  const key = { key: "Escape", target: {}, repeat: true, preventDefault() {} };
+  assert.ok(emergency.key(key));
+  assert.deepEqual(repeated(), ["stop 101"]);
+  hear({ emergency: true, stop_set: true });
+  emergency.key(key);
+  assert.deepEqual(repeated(), [], "it is done");
+});
