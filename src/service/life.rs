@@ -68,6 +68,8 @@ struct Peer {
     watch: RestartWatch,
     /// When it was last asked whether it is still the same.
     asked: Option<Instant>,
+    /// When it was last asked to tell its incarnation, which it has not told yet.
+    introduced: Option<Instant>,
     /// Whether its next answer will show whether it is.
     is_doubtful: bool,
     /// How often it was asked since its last answer.
@@ -145,6 +147,7 @@ impl Life {
             Peer {
                 watch: RestartWatch::of(announced.map(|(_, _, incarnation)| incarnation)),
                 asked: None,
+                introduced: None,
                 is_doubtful: false,
                 unanswered: 0,
                 alive: now,
@@ -198,9 +201,9 @@ impl Life {
         let Some(peer) = self.peers.get_mut(&id) else {
             return;
         };
-        let is_due = peer.asked.is_none_or(|asked| now >= asked + Self::CHECK);
+        let is_due = peer.introduced.is_none_or(|at| now >= at + Self::CHECK);
         if peer.watch.incarnation().is_none() && is_due {
-            peer.asked = Some(now);
+            (peer.introduced, peer.asked) = (Some(now), Some(now));
             out.send_with(id, Priority::High, &self.own.query());
         }
     }
