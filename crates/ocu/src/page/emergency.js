@@ -154,18 +154,18 @@ export class Emergency {
   }
 
   #render() {
-    const how = this.#condition ?? (this.#isWanted ? "wanted" : this.#barred ? "barred" : "ready");
+    const how = this.#condition ?? (this.#barred ? "barred" : this.#isWanted ? "wanted" : "ready");
     document.body.dataset.emergency = how;
     const [word, detail] = this.#condition
       ? stopWords(this.#condition, this.#speed)
       : {
           ready: ["Emergency stop", touch.matches ? "stops the vehicle at once" : "Esc or Space"],
-          barred: ["Emergency stop", this.#barred],
+          barred: ["Emergency stop", this.#isWanted ? `NOT SENT: ${this.#barred}` : this.#barred],
           wanted: ["Stopping", this.#link.open ? this.#refusal || "not confirmed yet" : "NOT SENT: no connection"],
         }[how];
     say(get("estop-word"), word);
     say(get("estop-detail"), detail);
-    mark(get("estop"), "aria-pressed", String(this.#condition !== null || how === "wanted"));
+    mark(get("estop"), "aria-pressed", String(this.#condition !== null || this.#isWanted));
     show(get("runaway"), this.#condition === "runaway");
     const count = this.#vehicles.length;
     show(get("estop-all"), count > 1);

@@ -13,8 +13,8 @@ const TOKEN: &str = "a-token-of-the-tests";
 /// The page is loaded anew until all of its files are there.
 ///
 /// Without the token nothing is shown, and the emergency stop does not look alive: it asks for the
-/// token by touch and by key. With the token it stops the vehicle. Where pages may watch without the
-/// token, they may also stop the vehicle, and clear no emergency.
+/// token by touch and by key, and says that nothing is sent. Once it has the token it stops the vehicle.
+/// Where pages may watch without the token, they may also stop the vehicle, and clear no emergency.
 pub(crate) fn run() {
     let file = std::env::temp_dir().join(format!("jaus-e2e-token-{}", std::process::id()));
     std::fs::write(&file, TOKEN).unwrap();
@@ -46,14 +46,17 @@ pub(crate) fn run() {
 
     page.press("#estop");
     page.wait("document.activeElement.id === 'token'");
+    assert_eq!(
+        page.text("#estop-detail"),
+        "NOT SENT: enter the token to use it"
+    );
     is_accessible(&mut page, "Token required");
     page.key_down("Escape", "Escape");
     page.key_up("Escape", "Escape");
     page.wait("!document.querySelector('#token-sheet').hidden");
     page.write("#token", TOKEN);
     page.press("#token-form .primary");
-    page.wait("document.body.dataset.emergency === 'ready'");
-    page.press("#estop");
+    // The stop that was pressed before is sent now.
     page.wait("document.body.dataset.emergency === 'stopped'");
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
     page.press("#estop-clear");
