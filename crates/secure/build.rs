@@ -13,7 +13,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
     let mut loader = Loader::new();
     loader.catalogue();
-    let library = loader.load().library;
+    let loaded = loader.load();
+    if loaded.diagnostics.has_errors() {
+        return Err(loaded.diagnostics.to_string().into());
+    }
+    let library = loaded.library;
     // Several services may give the same code to the same message, or call it a command or not.
     let mut messages: BTreeMap<(u16, &str), bool> = BTreeMap::new();
     let mut services: BTreeMap<&str, BTreeSet<u16>> = BTreeMap::new();

@@ -16,7 +16,7 @@
 //! inside a request for an event, but not to those inside a list or a mission. Control, emergencies
 //! and configuration have words of their own: `only` does not concern them.
 //!
-//! A message that no definition has is a command: whoever knows it gives the right to it.
+//! A message that is in no definition counts as a command: nobody knows what it does.
 //!
 //! Who may observe may set an emergency, because a stop must not fail for lack of a right, unless
 //! `except=SetEmergency` takes it away.

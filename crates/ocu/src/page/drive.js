@@ -4,7 +4,7 @@
 import { get, mark, plain, say, toast } from "./dom.js";
 import { DriveEnd } from "./drive_end.js";
 import { Gamepads } from "./gamepad.js";
-import { Input } from "./input.js";
+import { ENDED, Input } from "./input.js";
 import { InputEvents } from "./input_events.js";
 
 const PERIOD = 100;
@@ -48,7 +48,7 @@ export class Drive {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
     const ended = this.#end.update(state);
-    if (ended) this.#tellEnd("bad", `Driving ended: ${ended}`);
+    if (ended) this.#tellEnd("bad", `${ENDED}${ended}`);
     this.#halt = plain(state?.drive?.reason, 200);
     this.#holdReason = plain(state?.vehicle?.held?.reason, 200);
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
@@ -97,7 +97,7 @@ export class Drive {
       this.#render([0, 0], null);
     }
     const notice = this.#input.takeNotice();
-    if (notice.startsWith("Driving ended")) this.#tellEnd("warn", notice);
+    if (notice.startsWith(ENDED)) this.#tellEnd("warn", notice);
     else if (notice) toast("warn", notice);
   }
 

@@ -3,26 +3,23 @@
 // emergency, over reconnections and other vehicles as well; that it has stopped shows in its speed.
 // Clearing it takes two.
 
-import { get, mark, objects, say, show, toast } from "./dom.js";
+import { get, mark, say, show, toast } from "./dom.js";
 import { StopLink } from "./stop_link.js";
 import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
 const CLEAR_TEXT = "The vehicle can move again once a client resumes and commands it. Check it first.";
-const MOST = 256;
 const touch = matchMedia("(hover: none)");
 
 export class Emergency {
   #link;
+  /** Holds the stops that are not confirmed yet. */
   #stops;
-  /** The vehicles that the operator has stopped, and whose stop is not confirmed yet. */
-  #wanted = new Set();
   /** Whether the operator has pressed a stop before the page knew a vehicle. */
   #wantedFirst = false;
   /** How far the vehicle's stop is; null while it reports no emergency. */
   #condition = null;
   #speed = null;
   #refusal = "";
-  #wantedAll = false;
   /** How many requests to clear are not answered: what the station says meanwhile may be over with them. */
   #clearings = 0;
   #vehicles = [];
@@ -43,9 +40,6 @@ export class Emergency {
     this.#stops.addEventListener("refused", ({ detail }) => this.#refuse(detail));
     link.addEventListener("hello", () => this.#stops.start());
     link.addEventListener("barred", () => this.#stops.close());
-    // What has just arrived was said after the stop, but for what was under way.
-    link.addEventListener("state", ({ detail: { vehicle } }) => vehicle && this.#confirm(vehicle, vehicle.emergency === true));
-    link.addEventListener("fleet", ({ detail }) => this.#confirmAll(detail));
     this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
     get("estop-all").addEventListener("click", () => this.stopAll());
@@ -64,16 +58,13 @@ export class Emergency {
     this.#press(() => {
       const { vehicle } = this.#link;
       if (vehicle === null) this.#wantedFirst = true;
-      else this.#want(vehicle);
+      else this.#stops.stop(vehicle);
     });
   }
 
   /** Stops all vehicles. */
   stopAll() {
-    this.#press(() => {
-      this.#wantedAll = true;
-      this.#stops.stopAll();
-    });
+    this.#press(() => this.#stops.stopAll());
   }
 
   #press(stop) {
@@ -86,30 +77,20 @@ export class Emergency {
     navigator.vibrate?.(80);
   }
 
-  #want(vehicle) {
-    this.#wanted.add(vehicle);
-    this.#stops.stop(vehicle);
+  /** Takes a state that has just arrived. What it says was said after the stops, but for what was under way. */
+  handleState({ vehicle }) {
+    if (vehicle) this.#confirm(vehicle, vehicle.emergency === true);
   }
 
-  #forget(vehicle) {
-    this.#wanted.delete(vehicle);
-    this.#stops.cancel(vehicle);
-  }
-
-  #forgetAll() {
-    this.#wantedAll = false;
-    this.#stops.cancel("all");
+  /** Takes a list of vehicles that has just arrived, and whether all are to be stopped. */
+  handleFleet({ vehicles, allStopped }) {
+    for (const vehicle of vehicles) this.#confirm(vehicle, vehicle.state === "emergency");
+    if (this.#clearings === 0 && allStopped && pendingStops(vehicles) === 0) this.#stops.cancel("all");
   }
 
   /** Takes what the station says of a vehicle, and whether that reports its emergency. */
   #confirm({ subsystem, stop_set: isSet }, isStopped) {
-    if (this.#clearings === 0 && isSet === true && isStopped) this.#forget(subsystem);
-  }
-
-  #confirmAll({ vehicles, all_stopped: isLatched }) {
-    const known = objects(vehicles, MOST);
-    for (const vehicle of known) this.#confirm(vehicle, vehicle.state === "emergency");
-    if (this.#clearings === 0 && isLatched === true && pendingStops(known) === 0) this.#forgetAll();
+    if (this.#clearings === 0 && isSet === true && isStopped) this.#stops.cancel(subsystem);
   }
 
   /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. With
@@ -138,14 +119,14 @@ export class Emergency {
     this.#speed = state?.vehicle?.velocity?.x;
     if (this.#wantedFirst && this.#link.vehicle !== null) {
       this.#wantedFirst = false;
-      this.#want(this.#link.vehicle);
+      this.#stops.stop(this.#link.vehicle);
     }
     this.#render();
   }
 
   /** Whether a stop that concerns the vehicle is not confirmed yet. */
   get #isWanted() {
-    return this.#wantedAll || this.#wantedFirst || this.#wanted.has(this.#link.vehicle);
+    return this.#wantedFirst || this.#stops.wants("all") || this.#stops.wants(this.#link.vehicle);
   }
 
   #refuse(reason) {
@@ -169,8 +150,9 @@ export class Emergency {
     show(get("runaway"), this.#condition === "runaway");
     const count = this.#vehicles.length;
     show(get("estop-all"), count > 1);
-    say(get("estop-all-detail"), stopAllWords(this.#vehicles, this.#wantedAll));
-    mark(get("estop-all"), "data-wanted", this.#wantedAll ? "yes" : null);
+    const wantsAll = this.#stops.wants("all");
+    say(get("estop-all-detail"), stopAllWords(this.#vehicles, wantsAll));
+    mark(get("estop-all"), "data-wanted", wantsAll ? "yes" : null);
     show(get("latch"), this.#latched);
     get("latch-clear").disabled = !this.#clears;
     const stopped = this.#vehicles.filter(({ state }) => state === "emergency").length;
@@ -197,12 +179,8 @@ export class Emergency {
   async #clear(request) {
     this.#closeSheet();
     // The operator's last word counts.
-    if (request.type === "emergency_all") {
-      for (const vehicle of [...this.#wanted]) this.#forget(vehicle);
-      this.#forgetAll();
-    } else {
-      this.#forget(this.#link.vehicle);
-    }
+    if (request.type === "emergency_all") this.#stops.cancelAll();
+    else this.#stops.cancel(this.#link.vehicle);
     this.#clearings += 1;
     const reason = await this.#link.ask(request);
     this.#clearings -= 1;

@@ -7,6 +7,9 @@ import { GamepadSource, KeySource, PointerSource } from "./sources.js";
 /** After a pause of the page of this length, in milliseconds, nobody knows what was let go meanwhile. */
 const LATE = 300;
 
+/** How a notice of the end of a drive begins. */
+export const ENDED = "Driving ended: ";
+
 export class Input {
   #keys = new KeySource();
   #mouse = new PointerSource("Mouse");
@@ -137,7 +140,7 @@ export class Input {
   }
 
   #refuse(reason, now) {
-    if (this.#owner) this.#notice = `Driving ended: ${reason}.`;
+    if (this.#owner) this.#notice = `${ENDED}${reason}.`;
     this.end(reason, now);
   }
 

@@ -60,10 +60,12 @@ link.addEventListener("hello", async ({ detail }) => {
 });
 link.addEventListener("state", ({ detail }) => {
   state = detail;
+  emergency.handleState(state);
   render();
 });
 link.addEventListener("fleet", ({ detail }) => {
   fleet.handle(detail);
+  emergency.handleFleet(fleet);
   render();
 });
 link.addEventListener("tree", ({ detail }) => showTree(detail));

@@ -63,10 +63,21 @@ export class StopLink extends EventTarget {
     this.#begin("all", "stop-all", { type: "emergency_all", on: true });
   }
 
-  /** Ends the repetitions for a subsystem or `all`: the stop is confirmed. */
+  /** Whether the stop of a subsystem or `all` is repeated. */
+  wants(target) {
+    return this.#stops.has(target);
+  }
+
+  /** Ends the repetitions for a subsystem or `all`. */
   cancel(target) {
     this.#stops.delete(target);
     if (this.#stops.size === 0) clearTimeout(this.#timer);
+  }
+
+  /** Ends all repetitions. */
+  cancelAll() {
+    this.#stops.clear();
+    clearTimeout(this.#timer);
   }
 
   get #frames() {

@@ -396,7 +396,7 @@ impl Shared {
         }
         match token_of_handshake(headers) {
             Some(shown) if self.admits(shown).await => self.trust(visitor, places),
-            // The page connects, reports the wrong token and queries for another.
+            // Hello says that the token is needed, so that the page asks the user for another.
             _ => {
                 visitor.settle(Some(self.place(strangers, visitor)?));
                 Ok(())

@@ -54,9 +54,8 @@ pub(crate) fn run_rough(seed: u64) -> Outcome {
     outcome(world)
 }
 
-/// A trial in which only the clocks are wrong. The links are short: on one of 200 ms each way the
-/// station sends states in clumps while somebody drives, and with clocks that are slewed by 8 % the picture
-/// becomes older than a setpoint allows.
+/// A trial in which only the clocks are wrong. The links are short: over 200 ms each way, states arrive in
+/// clumps during a drive, and with clocks slewed by 8 % the picture gets too old for a setpoint.
 pub(crate) fn run_quiet(seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let rates = [(); 5].map(|()| random.choose(&[1.0, 1.08, 0.92]));

@@ -84,7 +84,7 @@ pub(crate) struct Witness {
     /// The longest one-way times of the last seconds: page to station, and station to vehicle.
     ways: Vec<(Duration, [Duration; 2], Duration)>,
     driven: [Option<Way>; 2],
-    /// Whether nothing but clocks is wrong: then whoever holds drives.
+    /// Whether only clocks are wrong, so that no drive may be interrupted.
     pub(crate) is_quiet: bool,
     pub(crate) broken: Option<String>,
     broken_at: Duration,
@@ -276,7 +276,7 @@ impl Witness {
         self.break_rule(now, &format!("vehicle {vehicle} moves {way:?}: {reasons}"));
     }
 
-    /// Without any trouble, whoever holds a vehicle that is ready drives it.
+    /// Where only clocks are wrong, a vehicle that is ready moves while it is held.
     fn judge_liveness(&mut self, now: Duration, vehicle: usize, driven: Option<Way>) {
         let begins = self.limit(BEGINNING) + self.way([0, 1]);
         let idle = |it: &&Hold| {

@@ -3,21 +3,7 @@
 import assert from "node:assert/strict";
 import test, { mock } from "node:test";
 
-class Element extends EventTarget {
-  hidden = false;
-  disabled = false;
-  textContent = "";
-  hasAttribute = () => false;
-  getAttribute = () => null;
-  setAttribute() {}
-  removeAttribute() {}
-  contains = () => false;
-  focus() {}
-  append() {}
-  remove() {}
-  children = [];
-  dataset = {};
-}
+import { forgetElements, get } from "./fake_elements.mjs";
 
 class Socket extends EventTarget {
   static all = [];
@@ -36,16 +22,12 @@ class Socket extends EventTarget {
   }
 }
 
-const elements = new Map();
-const get = (id) => elements.get(id) ?? elements.set(id, new Element()).get(id);
 Object.assign(globalThis, {
-  document: { getElementById: get, createElement: () => new Element(), body: { dataset: {} } },
-  matchMedia: () => ({ matches: false }),
   location: { protocol: "http:", host: "station" },
   HTMLInputElement: class {},
   WebSocket: Socket,
 });
-
+// Newer versions of Node.js have one of their own.
 Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });
 
 const { Emergency } = await import("../../src/page/emergency.js");
@@ -54,7 +36,7 @@ const clears = { clears: true, clearsAny: false };
 
 function page({ vehicle = 101, barred = "" } = {}) {
   mock.timers.enable({ apis: ["setTimeout"] });
-  elements.clear();
+  forgetElements();
   Socket.all = [];
   let answer;
   const unbarred = [];
@@ -77,17 +59,16 @@ function page({ vehicle = 101, barred = "" } = {}) {
     /** A state arrives. */
     hear: (changes) => {
       const detail = state(changes);
-      link.dispatchEvent(new CustomEvent("state", { detail }));
+      emergency.handleState(detail);
       update(detail);
     },
     /** A list of vehicles arrives. */
-    hearFleet: (vehicles, isLatched = false) =>
-      link.dispatchEvent(new CustomEvent("fleet", { detail: { vehicles, all_stopped: isLatched } })),
+    hearFleet: (vehicles, allStopped = false) => emergency.handleFleet({ vehicles, allStopped }),
     answer: async (reason) => {
       answer(reason);
       await new Promise((resolve) => setImmediate(resolve));
     },
-    /** What is sent in the next second. */
+    /** What is sent in the next 2 s. */
     repeated: () => {
       Socket.all.forEach(({ sent }) => sent.splice(0));
       for (let round = 0; round < 4; round++) mock.timers.tick(500);
@@ -128,7 +109,7 @@ test("an old picture confirms nothing", () => {
 test("a stop after one's own clearing outlives it", async () => {
   const { emergency, hear, answer, repeated } = page();
   hear({ emergency: true, stop_set: true });
-  get("clear-yes").dispatchEvent(new Event("click"));
+  get("clear-yes").click();
   emergency.stop();
   hear({ emergency: true, stop_set: true });
   assert.deepEqual(repeated(), ["stop 101"], "the clearing is still under way");
@@ -140,7 +121,7 @@ test("a stop after one's own clearing outlives it", async () => {
 test("clearing ends the repetitions of an earlier stop", () => {
   const { emergency, repeated } = page();
   emergency.stop();
-  get("clear-yes").dispatchEvent(new Event("click"));
+  get("clear-yes").click();
   assert.deepEqual(repeated(), []);
 });
 

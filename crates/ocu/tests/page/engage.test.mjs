@@ -3,27 +3,11 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-class Element extends EventTarget {
-  hidden = false;
-  textContent = "";
-  dataset = {};
-  children = [];
-  hasAttribute = () => false;
-  getAttribute = () => null;
-  setAttribute() {}
-  append() {}
-  remove() {}
-}
+import { get } from "./fake_elements.mjs";
 
 let now = 0;
 globalThis.setTimeout = () => {};
 Object.defineProperty(globalThis, "performance", { value: { now: () => now }, configurable: true });
-const elements = new Map();
-globalThis.document = {
-  body: new Element(),
-  createElement: () => new Element(),
-  getElementById: (id) => elements.get(id) ?? elements.set(id, new Element()).get(id),
-};
 const { Engage } = await import("../../src/page/engage.js");
 
 const vehicle = (state, subsystem = 101) => ({ subsystem, parts: [{ role: "primitive_driver", state, ours: true }] });
@@ -40,7 +24,7 @@ function pressed() {
     () => (isReady = true),
   );
   engage.update(free, true, "");
-  elements.get("by-hand").dispatchEvent(new Event("click"));
+  get("by-hand").click();
   return { engage, asked, isReady: () => isReady };
 }
 

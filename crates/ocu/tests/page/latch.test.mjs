@@ -3,31 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-class Element extends EventTarget {
-  hidden = false;
-  disabled = false;
-  textContent = "";
-  #attributes = new Map();
-  hasAttribute = (name) => this.#attributes.has(name);
-  getAttribute = (name) => this.#attributes.get(name) ?? null;
-  setAttribute = (name, value) => this.#attributes.set(name, String(value));
-  removeAttribute = (name) => this.#attributes.delete(name);
-  contains = () => false;
-  focus() {}
-  click() {
-    this.dispatchEvent(new Event("click"));
-  }
-}
-
-const elements = new Map();
-const get = (id) => {
-  if (!elements.has(id)) elements.set(id, new Element());
-  return elements.get(id);
-};
-Object.assign(globalThis, {
-  document: { getElementById: get, createElement: () => new Element(), body: { dataset: {} } },
-  matchMedia: () => ({ matches: false }),
-});
+import { forgetElements, get } from "./fake_elements.mjs";
 
 const { Emergency } = await import("../../src/page/emergency.js");
 
@@ -35,7 +11,7 @@ const stopped = { subsystem: 101, presence: "present", state: "emergency", at_re
 const standing = { ...stopped, state: "standby" };
 
 function page() {
-  elements.clear();
+  forgetElements();
   const requests = [];
   const link = Object.assign(new EventTarget(), {
     open: true,

@@ -5,10 +5,10 @@ include!(concat!(env!("OUT_DIR"), "/known.rs"));
 
 /// Whether a definition calls the messages with this code commands; `None` if no definition has it.
 pub(super) fn is_command(code: u16) -> Option<bool> {
-    let known = MESSAGES.iter().filter(|(known, ..)| *known == code);
-    known
-        .map(|(.., is_command)| *is_command)
-        .reduce(|one, other| one || other)
+    let rest = &MESSAGES[MESSAGES.partition_point(|(known, ..)| *known < code)..];
+    let known = rest.iter().take_while(|(known, ..)| *known == code);
+    let are_commands = known.map(|(.., is_command)| *is_command);
+    are_commands.reduce(|one, other| one || other)
 }
 
 /// The codes of the messages with this name, and of those that the service with it receives. A service's name is its URN,
@@ -21,7 +21,7 @@ pub(super) fn codes_of(name: &str) -> Vec<u16> {
     inputs.chain(messages.map(|(code, ..)| *code)).collect()
 }
 
-/// All messages, with code and name.
+/// All messages, with code, name and whether a definition calls them commands.
 #[cfg(test)]
 pub(super) fn messages() -> impl Iterator<Item = (u16, &'static str, bool)> {
     MESSAGES.iter().copied()

@@ -23,7 +23,7 @@ const ATTEMPTS: usize = 8;
 
 /// Measures with one operator.
 pub(crate) struct Measurement<'a> {
-    pub(crate) bed: &'a Bed,
+    bed: &'a Bed,
     operator: Operator<'a>,
 }
 
