@@ -110,6 +110,18 @@ impl Cable {
         }
     }
 
+    /// Makes it good again: what waits in the queue of a slow link goes out at once.
+    pub(crate) fn mend(&mut self, now: Duration) {
+        self.wire = Wire::good();
+        for direction in [&mut self.up, &mut self.down] {
+            direction.busy_until = now;
+            direction.last.clear();
+            for (connection, frame) in std::mem::take(&mut direction.flights).into_values() {
+                direction.launch(now, connection, frame, &self.wire, &mut self.random);
+            }
+        }
+    }
+
     pub(crate) fn send_up(&mut self, now: Duration, connection: Connection, frame: Frame) {
         if self.is_cut() {
             return self.up.held.push((connection, frame));

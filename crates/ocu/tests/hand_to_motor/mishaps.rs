@@ -59,7 +59,7 @@ impl Mishaps {
             Self::end(world, end);
         }
         for page in &mut world.pages {
-            page.cable.wire = Wire::good();
+            page.cable.mend(world.now);
         }
         world.air.weather = Weather::good();
         world.trace(|| "all is well".to_owned());
