@@ -26,6 +26,9 @@ pub(crate) struct Rules {
     heard: BTreeMap<JausId, Instant>,
     /// Whether the client in control has sent Resume, and nothing has stopped the vehicle since.
     resumed: bool,
+    /// Clients that have restarted since they got control: the vehicle may notice it by their next
+    /// message, which ends their control before it is followed.
+    restarted: BTreeSet<JausId>,
     /// Clients whose commands it should execute now.
     acts_for: Vec<JausId>,
 }
@@ -47,8 +50,14 @@ impl Rules {
             emergencies: BTreeSet::new(),
             heard: BTreeMap::new(),
             resumed: false,
+            restarted: BTreeSet::new(),
             acts_for: Vec::new(),
         }
+    }
+
+    /// Notes that a client has restarted.
+    pub(crate) fn restart(&mut self, client: JausId) {
+        self.restarted.insert(client);
     }
 
     /// Processes a message that the vehicle is about to receive.
@@ -99,13 +108,18 @@ impl Rules {
             if let Some(told) = self.told.filter(|&told| told != client) {
                 return Err(format!("{told} and {client} are both in control"));
             }
-            self.told = Some(client);
+            if self.told.replace(client).is_none() {
+                self.restarted.remove(&client);
+            }
             self.asked = now;
         } else if let Ok(reject) = RejectControl::decode(&message.payload)
             && reject.response_code == reject_control::ResponseCode::CONTROL_RELEASED
             && self.told == Some(client)
         {
             self.told = None;
+            if self.restarted.remove(&client) {
+                self.acts_for.retain(|&id| id != client);
+            }
         }
         Ok(())
     }
