@@ -228,6 +228,8 @@ impl Stack {
     /// Handles a message to this component.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         self.end_overdue(now);
+        // One that was given up is watched again as soon as it says anything: before it is answered.
+        self.watch_setter(now, message.source);
         self.life.hear(now, message);
         self.end_control_of_restarted(now);
         self.discovery.hear(now, message);
@@ -266,10 +268,15 @@ impl Stack {
         let is_alive = |client| self.life.is_alive(now, client);
         let control = &mut self.control;
         let handled = control.handle_message(now, message, is_alive, &mut self.out);
-        if self.control.has_emergency_of(message.source) {
-            self.life.watch(now, message.source, Rank::EmergencySetter);
-        }
+        self.watch_setter(now, message.source);
         handled
+    }
+
+    /// Watches the sender of a message if it has set an emergency.
+    fn watch_setter(&mut self, now: Instant, sender: JausId) {
+        if self.control.has_emergency_of(sender) {
+            self.life.watch(now, sender, Rank::EmergencySetter);
+        }
     }
 
     /// Handles the acknowledgement of a message by the peer's node.

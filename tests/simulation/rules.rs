@@ -29,6 +29,8 @@ pub(crate) struct Rules {
     /// Clients that have restarted since they got control: the vehicle may notice it by their next
     /// message, which ends their control before it is followed.
     restarted: BTreeSet<JausId>,
+    /// The client whose control has ended since the last check.
+    released: Option<JausId>,
     /// Clients whose commands it should execute now.
     acts_for: Vec<JausId>,
 }
@@ -51,6 +53,7 @@ impl Rules {
             heard: BTreeMap::new(),
             resumed: false,
             restarted: BTreeSet::new(),
+            released: None,
             acts_for: Vec::new(),
         }
     }
@@ -110,6 +113,8 @@ impl Rules {
             }
             if self.told.replace(client).is_none() {
                 self.restarted.remove(&client);
+                // Another client takes over as it is; one that was released must resume again.
+                self.resumed &= self.released != Some(client);
             }
             self.asked = now;
         } else if let Ok(reject) = RejectControl::decode(&message.payload)
@@ -117,6 +122,7 @@ impl Rules {
             && self.told == Some(client)
         {
             self.told = None;
+            self.released = Some(client);
             if self.restarted.remove(&client) {
                 self.acts_for.retain(|&id| id != client);
             }
@@ -138,6 +144,7 @@ impl Rules {
                 "{controller:?} is in control, and {told:?} was told"
             ));
         }
+        self.released = None;
         self.resumed &= controller.is_some();
         if (standing.state == State::Emergency) == self.emergencies.is_empty() {
             let clients = &self.emergencies;

@@ -335,6 +335,22 @@ fn a_setter_that_shows_life_again_is_alive() {
 }
 
 #[test]
+fn any_message_of_a_setter_shows_its_life_before_it_is_answered() {
+    let refused = confirmed(THIRD, Confirmation::NOT_AVAILABLE);
+    let mut rig = Rig::managed();
+    rig.hear(THIRD, &STOP);
+    rig.dead.push(THIRD);
+    rig.run(Duration::from_secs(10));
+    rig.dead.clear();
+    assert_eq!(rig.request(THIRD, 100), [refused], "in its own emergency");
+    rig.dead.push(THIRD);
+    rig.run(Duration::from_secs(10));
+    rig.hear(THIRD, &QueryHeartbeatPulse);
+    let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
+    assert_eq!(rig.request(FIRST, 100), [refused]);
+}
+
+#[test]
 fn a_managed_component_begins_in_standby_and_only_its_controller_moves_it() {
     let mut rig = Rig::managed();
     assert_eq!(rig.state(), State::Standby);
