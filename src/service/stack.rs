@@ -231,7 +231,7 @@ impl Stack {
         // One that was given up is watched again as soon as it says anything: before it is answered.
         self.watch_setter(now, message.source);
         self.life.hear(now, message);
-        self.end_control_of_restarted(now);
+        self.end_control_of_restarted(now, message);
         self.discovery.hear(now, message);
         self.subscriptions.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);

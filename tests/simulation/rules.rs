@@ -26,8 +26,9 @@ pub(crate) struct Rules {
     heard: BTreeMap<JausId, Instant>,
     /// Whether the client in control has sent Resume, and nothing has stopped the vehicle since.
     resumed: bool,
-    /// Clients that have restarted since they got control: the vehicle may notice it by their next
-    /// message, which ends their control before it is followed.
+    /// Clients that have restarted since they got control. The vehicle may follow them, end their
+    /// control by their next message before it is followed, or take that for an old one, because
+    /// they have counted their messages anew.
     restarted: BTreeSet<JausId>,
     /// The client whose control has ended since the last check.
     released: Option<JausId>,
@@ -123,9 +124,6 @@ impl Rules {
         {
             self.told = None;
             self.released = Some(client);
-            if self.restarted.remove(&client) {
-                self.acts_for.retain(|&id| id != client);
-            }
         }
         Ok(())
     }
@@ -138,6 +136,11 @@ impl Rules {
         acted_for: &[JausId],
     ) -> Result<(), String> {
         let controller = standing.controller.map(|it| it.id);
+        if self.told.is_some_and(|told| self.restarted.contains(&told)) {
+            // The vehicle does not tell it that its control has ended, or that it must resume again.
+            self.told = self.told.filter(|_| controller.is_some());
+            self.resumed &= standing.state == State::Ready;
+        }
         if controller != self.told {
             let told = self.told;
             return Err(format!(
@@ -158,7 +161,15 @@ impl Rules {
             return Err(format!("{} with resumed: {resumed}", standing.state));
         }
         let acts_for = std::mem::take(&mut self.acts_for);
-        if acted_for != acts_for {
+        let is_wrong = |is_restarted| {
+            let of = |ids: &[JausId]| -> Vec<_> {
+                let counts = |id: &JausId| self.restarted.contains(id) == is_restarted;
+                ids.iter().copied().filter(counts).collect()
+            };
+            let (acted_for, acts_for) = (of(acted_for), of(&acts_for));
+            acted_for != acts_for && !(is_restarted && acted_for.is_empty())
+        };
+        if is_wrong(false) || is_wrong(true) {
             return Err(format!("acted for {acted_for:?} instead of {acts_for:?}"));
         }
         let idle = now.saturating_duration_since(self.asked);

@@ -164,13 +164,18 @@ impl Control {
 
     /// Ends control and notifies the client. A ready component falls back to standby.
     pub(in crate::service) fn drop_controller(&mut self, out: &mut Outbox) {
-        self.deadline = None;
-        if let Some(controller) = self.standing.controller.take() {
+        if let Some(controller) = self.end_control() {
             reject(controller, Rejection::CONTROL_RELEASED, out);
         }
+    }
+
+    /// Ends control without a word. A ready component falls back to standby.
+    pub(super) fn end_control(&mut self) -> Option<Controller> {
+        self.deadline = None;
         if self.management.is_some() && self.standing.state == State::Ready {
             self.standing.state = State::Standby;
         }
+        self.standing.controller.take()
     }
 }
 

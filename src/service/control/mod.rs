@@ -259,6 +259,13 @@ impl Control {
         }
     }
 
+    /// Ends the control of a client that has restarted, which knows of none.
+    pub(super) fn end_control_of(&mut self, client: JausId) {
+        if self.is_controller(client) {
+            self.end_control();
+        }
+    }
+
     pub(super) fn is_controller(&self, client: JausId) -> bool {
         self.standing
             .controller

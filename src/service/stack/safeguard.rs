@@ -5,6 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use super::Stack;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::core::RequestControl;
+use crate::service::code_of;
 use crate::service::control::Condition;
 use crate::service::life::Rank;
 use crate::service::safety;
@@ -121,8 +125,11 @@ impl Stack {
     }
 
     /// Ends the motion and the control of clients that have restarted: the new incarnation is a new
-    /// client.
-    pub(super) fn end_control_of_restarted(&mut self, now: Instant) {
+    /// client. It is told, in case that it is still the one that was in control, unless the message
+    /// that shows the restart says otherwise.
+    pub(super) fn end_control_of_restarted(&mut self, now: Instant, message: &Received) {
+        let is_certain = Incarnation::told_in(&message.payload).is_some()
+            || code_of(&message.payload) == Some(RequestControl::CODE);
         while let Some(client) = self.life.poll_restarted() {
             self.order.forget(client);
             let is_moving = self
@@ -134,7 +141,11 @@ impl Stack {
             }
             tracing::warn!(id = %self.out.source(), %client, "the client in control has restarted");
             self.stop(&StopCause::Restarted(client));
-            self.control.forget(client, &mut self.out);
+            if is_certain {
+                self.control.end_control_of(client);
+            } else {
+                self.control.forget(client, &mut self.out);
+            }
             self.follow_control(now);
         }
     }

@@ -8,6 +8,9 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use serde_json::{Value, json};
 
+/// What the station wants to be shown by those who may drive.
+pub(crate) const TOKEN: &str = "the-token-of-this-simulation";
+
 struct Browser {
     process: Child,
     input: ChildStdin,
@@ -84,6 +87,7 @@ impl Browser {
         let mut process = Command::new("node")
             .args(["--experimental-vm-modules", "--no-warnings"])
             .arg(script.join("browser.mjs"))
+            .arg(TOKEN)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

@@ -13,8 +13,10 @@ pub(crate) type Connection = (u64, u64);
 /// What passes over a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Frame {
-    /// The page asks for a WebSocket at this path, or the station has opened it.
-    Open(String),
+    /// The page asks for a WebSocket at this path, with these subprotocols.
+    Open(String, Vec<String>),
+    /// The station has opened it.
+    Opened,
     Text(String),
     Close,
 }
@@ -128,7 +130,7 @@ impl Cable {
         }
         // Before the request there are two packets of TCP.
         let now = match frame {
-            Frame::Open(_) => now + 2 * self.wire.one_way(),
+            Frame::Open(..) => now + 2 * self.wire.one_way(),
             _ => now,
         };
         self.up
@@ -162,7 +164,7 @@ impl Direction {
         random: &mut Random,
     ) {
         let octets = match &frame {
-            Frame::Open(_) => 500,
+            Frame::Open(..) | Frame::Opened => 500,
             Frame::Text(text) => text.len() + HEADERS,
             Frame::Close => HEADERS,
         };

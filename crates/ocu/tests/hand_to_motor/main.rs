@@ -19,6 +19,7 @@
 //! * What has stopped after its hand was gone does not move until a hand takes it up.
 //! * An emergency stop over links that are free acts within 0.3 s and one way, and nothing moves until it
 //!   is cleared.
+//! * A stop that is pressed while things go wrong acts once all is well, and holds against every hand.
 //! * Once all is well, both operators can drive. Wrong clocks alone interrupt nobody who drives.
 //!
 //! `JAUS_SEEDS=n` runs n fresh seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its events.
@@ -62,6 +63,15 @@ fn only_a_living_hand_moves_a_vehicle() {
         "only_a_living_hand_moves_a_vehicle",
         FRESH_SEEDS,
         trial::run_rough,
+    );
+}
+
+#[test]
+fn a_stop_that_is_pressed_in_trouble_arrives() {
+    check(
+        "a_stop_that_is_pressed_in_trouble_arrives",
+        FRESH_SEEDS,
+        trial::run_stopped,
     );
 }
 

@@ -112,6 +112,7 @@ impl Mishaps {
                 let now = world.now;
                 world.interrupt(page, json!(["window", "pagehide"]));
                 world.pages[page].open(now, false);
+                world.witness.forget_stops(page);
             }
             5 if world.pages[page].frozen.is_none() => {
                 let until = world.now + world.random.between(&ms(50, 3000));

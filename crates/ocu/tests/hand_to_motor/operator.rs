@@ -19,6 +19,10 @@ pub(crate) struct Operator {
 pub(crate) enum Intent {
     /// Anything that the page offers.
     Any,
+    /// Nothing.
+    Nothing,
+    /// To move what the page shows, without clearing its emergency.
+    Push,
     /// To drive a vehicle, by its number from 0, and nothing else.
     Drive(usize),
 }
@@ -42,6 +46,8 @@ impl Operator {
         }
         match self.intent {
             Intent::Any => self.do_anything(world),
+            Intent::Nothing => {}
+            Intent::Push => self.push(world),
             Intent::Drive(vehicle) => self.drive(world, vehicle),
         }
     }
@@ -98,7 +104,15 @@ impl Operator {
         }
     }
 
-    fn hold(&mut self, world: &mut World, time: Duration, lost_of_1000: u32) {
+    fn push(&self, world: &mut World) {
+        let page = &mut world.pages[self.page];
+        if page.grip.is_none() {
+            page.happen(json!(["click", "by-hand"]));
+            self.hold(world, Duration::from_secs(1), 0);
+        }
+    }
+
+    fn hold(&self, world: &mut World, time: Duration, lost_of_1000: u32) {
         let devices = [Device::Keys, Device::Touch, Device::Gamepad];
         let device = world.random.choose(&devices);
         let gets_lost = world.random.happens(lost_of_1000);

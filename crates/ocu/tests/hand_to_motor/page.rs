@@ -43,6 +43,8 @@ pub(crate) struct View {
     notice: String,
     pub(crate) emergency: String,
     pub(crate) by_hand: bool,
+    /// Whether the page says that all vehicles are to be stopped.
+    pub(crate) is_latched: bool,
     /// How the page's connection is.
     pub(crate) link: String,
 }
@@ -135,7 +137,9 @@ impl Page {
             return;
         }
         match frame {
-            Frame::Open(_) => self.happen(json!(["opened", number])),
+            // Pages open connections, not the station.
+            Frame::Open(..) => {}
+            Frame::Opened => self.happen(json!(["opened", number])),
             Frame::Text(text) => self.happen(json!(["message", number, text])),
             Frame::Close => {
                 self.connections.retain(|it| *it != connection);
@@ -154,7 +158,9 @@ impl Page {
             match deed[0].as_str() {
                 Some("connect") => {
                     self.connections.push(connection);
-                    self.cable.send_up(now, connection, Frame::Open(text));
+                    let protocols = serde_json::from_value(deed[3].clone());
+                    let open = Frame::Open(text, protocols.expect("a list of words"));
+                    self.cable.send_up(now, connection, open);
                 }
                 Some("send") => self.cable.send_up(now, connection, Frame::Text(text)),
                 _ => {
@@ -177,6 +183,7 @@ impl Page {
             notice: text("notice"),
             emergency: text("emergency"),
             by_hand: deeds.view["byHand"] == true,
+            is_latched: deeds.view["latched"] == true,
             link: text("link"),
         };
     }

@@ -7,13 +7,14 @@ use futures_util::{SinkExt, StreamExt};
 use jaus::component::Kind;
 use jaus::link::custom::CustomLink;
 use jaus::node::{Config, Node};
-use jaus_ocu::Station;
+use jaus_ocu::{Station, Token};
 use jaus_vehicle::parts::Slot;
 use tokio::io::{DuplexStream, duplex};
 use tokio::sync::mpsc;
 use tokio_tungstenite::client_async;
-use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::{ClientRequestBuilder, Message};
 
+use crate::browser::TOKEN;
 use crate::cable::{Connection, Frame};
 
 /// What the station has to say, with the page's number.
@@ -38,7 +39,7 @@ impl StationProgram {
         let slot = Slot::new(port, node, Kind::OperatorControlUnit, "Operator");
         let station = Station {
             vehicles: vehicles.to_vec(),
-            unprotected: true,
+            token: Token::new(TOKEN),
             ..Station::default()
         };
         let (browsers, accepted) = mpsc::channel(64);
@@ -55,7 +56,7 @@ impl StationProgram {
 
     /// Takes a frame of a page. Call it on the station's runtime.
     pub(crate) fn handle(&mut self, page: usize, connection: Connection, frame: Frame) {
-        if let Frame::Open(path) = frame {
+        if let Frame::Open(path, protocols) = frame {
             let (heard, frames) = mpsc::unbounded_channel();
             self.heard.push((page, connection, heard));
             let (browser, server) = duplex(BUFFER);
@@ -67,7 +68,7 @@ impl StationProgram {
                 let mut said = said.lock().expect("no panic");
                 said.push((page, connection, frame));
             };
-            tokio::spawn(carry(browser, path, frames, say));
+            tokio::spawn(carry(browser, request(&path, &protocols), frames, say));
             return;
         }
         self.heard.retain(|(.., heard)| !heard.is_closed());
@@ -84,18 +85,25 @@ impl StationProgram {
     }
 }
 
+/// The request of a browser for a WebSocket.
+fn request(path: &str, protocols: &[String]) -> ClientRequestBuilder {
+    let address = format!("ws://localhost{path}");
+    let request = ClientRequestBuilder::new(address.parse().expect("a path of the page"));
+    let add = |request: ClientRequestBuilder, word: &String| request.with_sub_protocol(word);
+    protocols.iter().fold(request, add)
+}
+
 /// Carries the frames of one connection between the page's end and the server.
 async fn carry(
     browser: DuplexStream,
-    path: String,
+    request: ClientRequestBuilder,
     mut frames: mpsc::UnboundedReceiver<Frame>,
     say: impl Fn(Frame),
 ) {
-    let address = format!("ws://localhost{path}");
-    let Ok((mut socket, _)) = client_async(address, browser).await else {
+    let Ok((mut socket, _)) = client_async(request, browser).await else {
         return say(Frame::Close);
     };
-    say(Frame::Open(String::new()));
+    say(Frame::Opened);
     loop {
         tokio::select! {
             frame = frames.recv() => match frame {

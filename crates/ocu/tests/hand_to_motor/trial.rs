@@ -16,6 +16,9 @@ const END: Duration = Duration::from_secs(13);
 /// Then both operators drive within this time: control may have to time out first.
 const PATIENCE: Duration = Duration::from_secs(25);
 
+/// What was stopped is held for so long.
+const PUSHING: Duration = Duration::from_secs(4);
+
 /// What was seen in a trial.
 #[derive(Debug)]
 pub(crate) struct Outcome {
@@ -54,6 +57,41 @@ pub(crate) fn run_rough(seed: u64) -> Outcome {
     outcome(world)
 }
 
+/// A trial in which somebody stops a vehicle while things go wrong, and nobody clears it: the stop arrives,
+/// and holds against every hand.
+pub(crate) fn run_stopped(seed: u64) -> Outcome {
+    let mut world = World::new(seed, [1.0; 5]);
+    let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Any));
+    let mut mishaps = Mishaps::new(BEGIN);
+    let (press, page) = (world.random.between(&(BEGIN..END)), world.random.below(2));
+    while world.now < END && !world.witness.is_done(world.now) {
+        if world.now >= press && operators[page].intent == Intent::Any {
+            operators
+                .iter_mut()
+                .for_each(|it| it.intent = Intent::Nothing);
+            world.stop(page);
+        }
+        mishaps.live(&mut world);
+        live(&mut world, &mut operators);
+    }
+    mishaps.heal(&mut world);
+    let end = world.now + PATIENCE;
+    while world.now < end && world.witness.awaits_stops() && !world.witness.is_done(world.now) {
+        live(&mut world, &mut operators);
+    }
+    if world.witness.awaits_stops() {
+        world
+            .witness
+            .break_rule(world.now, "all is well, and a stop has not arrived");
+    }
+    operators.iter_mut().for_each(|it| it.intent = Intent::Push);
+    let end = world.now + PUSHING;
+    while world.now < end && !world.witness.is_done(world.now) {
+        live(&mut world, &mut operators);
+    }
+    outcome(world)
+}
+
 /// A trial in which only the clocks are wrong. The links are short: over 200 ms each way, states arrive in
 /// clumps during a drive, and with clocks slewed by 8 % the picture gets too old for a setpoint.
 pub(crate) fn run_quiet(seed: u64) -> Outcome {
@@ -62,8 +100,8 @@ pub(crate) fn run_quiet(seed: u64) -> Outcome {
     let mut world = World::new(seed, rates);
     for page in 0..2 {
         world.pages[page].cable.wire = Wire {
-            delay: Duration::from_millis(world.random.choose(&[1, 10, 20])),
-            jitter: Duration::from_millis(world.random.choose(&[1, 5])),
+            delay: Duration::from_millis(world.random.choose(&[1, 10, 20, 100, 200, 300])),
+            jitter: Duration::from_millis(world.random.choose(&[1, 5, 20])),
             ..Wire::good()
         };
     }

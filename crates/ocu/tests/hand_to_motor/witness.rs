@@ -16,6 +16,8 @@ const DEAD_MAN_TWICE: Duration = Duration::from_millis(900);
 const FIRST_REPEAT: Duration = Duration::from_millis(300);
 /// The station sends an emergency on at once.
 const EMERGENCY: Duration = Duration::from_millis(300);
+/// The longest pause between two repetitions of a stop.
+const REPETITION: Duration = Duration::from_millis(500);
 /// A setpoint that is taken up sets the vehicle in motion within this time, and the time of one way.
 const BEGINNING: Duration = Duration::from_millis(500);
 /// What begins to move begins by a setpoint that has waited no longer.
@@ -72,6 +74,8 @@ struct Stop {
     page: usize,
     vehicle: usize,
     at: Duration,
+    /// Since when the way to the vehicle has been free.
+    free_since: Option<Duration>,
 }
 
 pub(crate) struct Witness {
@@ -153,12 +157,22 @@ impl Witness {
     }
 
     pub(crate) fn stop(&mut self, now: Duration, page: usize, vehicle: usize) {
-        let at = now;
-        self.stops.push(Stop { page, vehicle, at });
+        self.stops.push(Stop {
+            page,
+            vehicle,
+            at: now,
+            free_since: None,
+        });
     }
 
-    pub(crate) const fn forget_emergency(&mut self, vehicle: usize) {
+    /// A page is loaded anew: it repeats no stop of before.
+    pub(crate) fn forget_stops(&mut self, page: usize) {
+        self.stops.retain(|it| it.page != page);
+    }
+
+    pub(crate) fn forget_emergency(&mut self, vehicle: usize) {
         self.emergencies[vehicle] = false;
+        self.stops.retain(|it| it.vehicle != vehicle);
     }
 
     pub(crate) fn forget_emergencies(&mut self) {
@@ -170,6 +184,11 @@ impl Witness {
     pub(crate) fn drives(&self, page: usize) -> bool {
         let mut holds = self.holds.iter();
         holds.any(|it| it.page == page && !it.over && it.has_moved)
+    }
+
+    /// Whether a stop has not been judged yet.
+    pub(crate) const fn awaits_stops(&self) -> bool {
+        !self.stops.is_empty()
     }
 
     /// Whether nothing more is to be seen: a rule was broken a while ago, so that the story has its end.
@@ -314,7 +333,7 @@ impl Witness {
         self.limit(limit + first)
     }
 
-    /// Judges emergency stops over links that are free.
+    /// Judges emergency stops once the way to the vehicle is free: pages repeat them until then.
     fn judge_stops(&mut self, now: Duration, lives: &Lives, driven: [Option<Way>; 2]) {
         let is_free = |stop: &Stop| {
             let wire = &lives.wires[stop.page];
@@ -324,9 +343,16 @@ impl Witness {
             let reaches = lives.live[stop.page] && lives.air[stop.vehicle] && is_known;
             is_quick && is_alive && reaches && lives.vehicles[stop.vehicle]
         };
-        self.stops.retain(is_free);
-        for stop in std::mem::take(&mut self.stops) {
-            if now <= stop.at + self.limit(EMERGENCY) + self.way([stop.page]) {
+        for mut stop in std::mem::take(&mut self.stops) {
+            let since = is_free(&stop).then(|| stop.free_since.unwrap_or(now));
+            stop.free_since = since;
+            let pause = if since == Some(stop.at) {
+                Duration::ZERO
+            } else {
+                REPETITION
+            };
+            let limit = self.limit(EMERGENCY + pause) + self.way([stop.page]);
+            if since.is_none_or(|since| now <= since + limit) {
                 self.stops.push(stop);
                 continue;
             }
@@ -342,7 +368,7 @@ impl Witness {
         }
     }
 
-    fn break_rule(&mut self, now: Duration, what: &str) {
+    pub(crate) fn break_rule(&mut self, now: Duration, what: &str) {
         if self.broken.is_none() {
             story::note(now, &format!("BROKEN: {what}"));
             self.broken_at = now;

@@ -96,7 +96,6 @@ impl World {
                 page.cable.send_down(self.now, connection, Frame::Close);
             }
         }
-        self.witness.forget_emergencies();
     }
 
     pub(crate) fn start_vehicle(&mut self, vehicle: usize) {
@@ -204,19 +203,28 @@ impl World {
         self.pages[page].happen(event);
     }
 
-    /// The operator of a page stops its vehicle.
+    /// The operator of a page stops its vehicle, or all.
     pub(crate) fn stop(&mut self, page: usize) {
-        let vehicle = self.pages[page].view.vehicle;
-        self.interrupt(page, json!(["key", "keydown", "Escape", false]));
-        if let Some(vehicle) = VEHICLES.iter().position(|it| *it == vehicle) {
-            self.witness.stop(self.now, page, vehicle);
+        let stops_all = self.random.happens(200);
+        let shown = self.pages[page].view.vehicle;
+        self.interrupt(page, json!(["key", "keydown", "Escape", false, stops_all]));
+        for (vehicle, subsystem) in VEHICLES.into_iter().enumerate() {
+            if stops_all || subsystem == shown {
+                self.witness.stop(self.now, page, vehicle);
+            }
         }
     }
 
     /// The operator of a page clears the emergency of its vehicle.
     pub(crate) fn clear(&mut self, page: usize) {
         self.trace(|| format!("page {page} clears"));
-        for button in ["estop-clear", "clear-yes"] {
+        let is_latched = self.pages[page].view.is_latched;
+        let buttons = if is_latched {
+            &["latch-clear"][..]
+        } else {
+            &["estop-clear", "clear-yes"]
+        };
+        for button in buttons {
             self.pages[page].happen(json!(["click", button]));
         }
         self.witness.forget_emergencies();

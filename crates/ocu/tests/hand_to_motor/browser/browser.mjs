@@ -4,7 +4,7 @@
 //
 // {"page": 1, "now": 12.5, "open": true}         loads the page anew
 // {"page": 1, "now": 12.5, "events": [[11.5, "key", "keydown", "KeyW", false], …]}
-// → {"out": [["connect", 3, "/ws?vehicle=101"], ["send", 3, "…"], ["close", 3]], "next": 60.2, "view": {…}}
+// → {"out": [["connect", 3, "/ws?vehicle=101", ["jaus"]], ["send", 3, "…"], ["close", 3]], "next": 60.2, "view": {…}}
 //
 // `now` is `performance.now()` of the page's host, and an event begins with when it happened; `next` is
 // when the page has to be called again. After a pause of the page ("thaws": "timers" or "events") it learns
@@ -18,6 +18,8 @@ import vm from "node:vm";
 import { Document, Element, Event, Target } from "./document.mjs";
 
 const PAGE = new URL("../../../src/page/", import.meta.url);
+/** What the operators have got with the page's address. */
+const TOKEN = process.argv[2];
 /** A browser draws so often, in milliseconds. */
 const FRAME = 1000 / 60;
 
@@ -95,11 +97,11 @@ class Page {
       static #last = 0;
       readyState = 0;
       bufferedAmount = 0;
-      constructor(url) {
+      constructor(url, protocols) {
         super();
         this.number = ++WebSocket.#last;
         sockets.set(this.number, this);
-        out.push(["connect", this.number, new URL(url).pathname + new URL(url).search]);
+        out.push(["connect", this.number, new URL(url).pathname + new URL(url).search, [...protocols]]);
       }
       send(data) {
         if (this.readyState === 1) out.push(["send", this.number, data]);
@@ -129,7 +131,7 @@ class Page {
     }
     return {
       document,
-      location: { protocol: "http:", host: "localhost", pathname: "/", hash: "", reload() {} },
+      location: { protocol: "http:", host: "localhost", pathname: "/", hash: `#token=${TOKEN}`, reload() {} },
       history: { replaceState() {} },
       sessionStorage: tab.session,
       localStorage: tab.local,
@@ -208,16 +210,17 @@ class Page {
       source: this.#document.getElementById("drive-source").textContent,
       emergency: this.#document.body.dataset.emergency,
       byHand: !this.#document.getElementById("by-hand").hidden,
+      latched: !this.#document.getElementById("latch").hidden,
     };
     return { out: this.#out.splice(0), next: this.#next?.due ?? null, view };
   }
 
   /** What the user's devices do. */
 
-  _key(type, code, repeat) {
+  _key(type, code, repeat, shiftKey = false) {
     const target = this.#document.activeElement ?? this.#document.body;
     const key = { Escape: "Escape" }[code] ?? code;
-    target.dispatchEvent(this.#event(type, { code, key, repeat, ctrlKey: false, altKey: false, metaKey: false, shiftKey: false }));
+    target.dispatchEvent(this.#event(type, { code, key, repeat, ctrlKey: false, altKey: false, metaKey: false, shiftKey }));
   }
 
   _pointer(type, id, x, y, buttons) {
