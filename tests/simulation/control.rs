@@ -303,7 +303,7 @@ impl World {
                 let id = OPERATORS[place];
                 self.network
                     .restart(host, endpoint(id), Operator::party(now, id));
-                self.vehicle().rules.restart(id);
+                self.vehicle().rules.restart(now, id);
             }
             cut => self.network.set_cut(self.vehicle, host, cut == 38),
         }

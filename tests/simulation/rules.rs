@@ -29,12 +29,15 @@ pub(crate) struct Rules {
     /// Clients that have restarted since they got control. The vehicle may follow them, end their
     /// control by their next message before it is followed, or take that for an old one, because
     /// they have counted their messages anew.
-    restarted: BTreeSet<JausId>,
+    restarted: BTreeMap<JausId, Instant>,
     /// The client whose control has ended since the last check.
     released: Option<JausId>,
     /// Clients whose commands it should execute now.
     acts_for: Vec<JausId>,
 }
+
+/// No message is on its way for longer.
+const LATEST: Duration = Duration::from_secs(2);
 
 /// The message code at the head of a payload.
 fn code_of(payload: &[u8]) -> Option<u16> {
@@ -53,15 +56,15 @@ impl Rules {
             emergencies: BTreeSet::new(),
             heard: BTreeMap::new(),
             resumed: false,
-            restarted: BTreeSet::new(),
+            restarted: BTreeMap::new(),
             released: None,
             acts_for: Vec::new(),
         }
     }
 
     /// Notes that a client has restarted.
-    pub(crate) fn restart(&mut self, client: JausId) {
-        self.restarted.insert(client);
+    pub(crate) fn restart(&mut self, now: Instant, client: JausId) {
+        self.restarted.insert(client, now);
     }
 
     /// Processes a message that the vehicle is about to receive.
@@ -113,7 +116,10 @@ impl Rules {
                 return Err(format!("{told} and {client} are both in control"));
             }
             if self.told.replace(client).is_none() {
-                self.restarted.remove(&client);
+                // Its request may still be one of before.
+                let is_earlier = |at: &Instant| now.saturating_duration_since(*at) > LATEST;
+                self.restarted
+                    .retain(|id, at| *id != client || !is_earlier(at));
                 // Another client takes over as it is; one that was released must resume again.
                 self.resumed &= self.released != Some(client);
             }
@@ -136,7 +142,10 @@ impl Rules {
         acted_for: &[JausId],
     ) -> Result<(), String> {
         let controller = standing.controller.map(|it| it.id);
-        if self.told.is_some_and(|told| self.restarted.contains(&told)) {
+        if self
+            .told
+            .is_some_and(|told| self.restarted.contains_key(&told))
+        {
             // The vehicle does not tell it that its control has ended, or that it must resume again.
             self.told = self.told.filter(|_| controller.is_some());
             self.resumed &= standing.state == State::Ready;
@@ -163,7 +172,7 @@ impl Rules {
         let acts_for = std::mem::take(&mut self.acts_for);
         let is_wrong = |is_restarted| {
             let of = |ids: &[JausId]| -> Vec<_> {
-                let counts = |id: &JausId| self.restarted.contains(id) == is_restarted;
+                let counts = |id: &JausId| self.restarted.contains_key(id) == is_restarted;
                 ids.iter().copied().filter(counts).collect()
             };
             let (acted_for, acts_for) = (of(acted_for), of(&acts_for));

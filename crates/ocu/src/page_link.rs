@@ -125,8 +125,11 @@ impl PageLink {
     const FOLLOWS: u32 = 100;
     /// Interval of states.
     const PERIOD: Duration = Duration::from_millis(100);
-    /// Most states under way: those of one second.
-    const MOST_UNDER_WAY: usize = 10;
+    /// So many more are under way while their confirmations wait for the next setpoint, and for the page
+    /// to draw.
+    const CONFIRMING: usize = 2;
+    /// Most states under way: those of one second, and these.
+    const MOST_UNDER_WAY: usize = 10 + Self::CONFIRMING;
     /// Most round trips kept.
     const MOST_SAMPLES: usize = 256;
     /// The page's clock runs so many times as fast as the station's at most: one is slewed forward while
@@ -270,8 +273,13 @@ impl PageLink {
         self.pause = Duration::ZERO;
         if delay <= Self::PROMPT && self.hold_until.is_none_or(|until| now >= until) {
             // States that would follow each other faster than they are made need no window.
-            let useful = idle.as_millis() / Self::PERIOD.as_millis() + 1;
-            let useful = usize::try_from(useful).unwrap_or(Self::MOST_UNDER_WAY);
+            let periods = idle.as_millis() / Self::PERIOD.as_millis();
+            let periods = usize::try_from(periods).unwrap_or(Self::MOST_UNDER_WAY);
+            let useful = if periods == 0 {
+                1
+            } else {
+                1 + periods + Self::CONFIRMING
+            };
             self.window = (self.window + 1).min(useful).min(Self::MOST_UNDER_WAY);
         }
     }
