@@ -97,8 +97,9 @@ export class Flow {
     this.#seen = seq;
     this.#seenAt = this.#now();
     this.#unconfirmed = true;
-    // While a setpoint is under way the link is busy: the next one confirms the state as well.
-    if (this.#underWay.length === 0) this.#confirm();
+    // During a drive the next setpoint confirms the state as well. After it, a long link would wait a
+    // round trip for that.
+    if (this.#underWay.length === 0 || !this.#driving) this.#confirm();
   }
 
   /** The state `seq` has arrived, but the browser shows nothing now. */
