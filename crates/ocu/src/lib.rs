@@ -21,6 +21,7 @@ pub(crate) mod page;
 pub mod page_link;
 mod pages;
 mod picture;
+mod press;
 mod report;
 pub mod request;
 mod role;

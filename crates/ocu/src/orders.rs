@@ -11,6 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use super::answer::Said;
 use super::ownership::{Owner, PageId};
 use super::page_link::TooOld;
+use super::press::Press;
 use super::request::OperatorRequest;
 use super::state::{Events, Overlay};
 use super::token::Token;
@@ -30,6 +31,8 @@ pub(super) enum Order {
         /// The vehicle that the page means; `None` for the one that it has selected.
         vehicle: Option<u16>,
         request: OperatorRequest,
+        /// With the clearing of a stop: the page's last press.
+        press: Option<Press>,
         /// Whether the page's user may change vehicles, and not only observe them.
         may_drive: bool,
         reply: Reply,
@@ -91,6 +94,8 @@ pub(super) struct DriveOrder {
 /// A stop, which overtakes all orders.
 pub(super) struct StopOrder {
     pub(super) target: StopTarget,
+    /// The press of which it is a copy, if the page says so.
+    pub(super) press: Option<Press>,
     /// The user who stops, for the log of events.
     pub(super) user: Arc<str>,
     pub(super) reply: StopReply,
@@ -110,6 +115,16 @@ pub(super) enum StopReply {
     Taken(Box<dyn FnOnce(Result<bool, String>) + Send>),
     /// When every part has confirmed it.
     Confirmed(Reply),
+}
+
+impl StopReply {
+    /// Answers a late copy of a stop that was cleared since.
+    pub(super) fn ignored(self) {
+        match self {
+            Self::Taken(taken) => taken(Ok(false)),
+            Self::Confirmed(reply) => reply(Ok(())),
+        }
+    }
 }
 
 /// The pages' interface to the session.

@@ -4,6 +4,7 @@ use jaus::address::JausId;
 use serde::Deserialize;
 
 use super::page_link::Seen;
+use super::press::Press;
 use super::users::UserRole;
 
 /// One frame from a page.
@@ -16,6 +17,10 @@ pub struct Frame {
     /// the page's is refused, except an emergency.
     #[serde(default)]
     pub vehicle: Option<u16>,
+    /// Of a stop: the press. Of its clearing: the last press of the page, whose late copies then stop
+    /// nothing any more.
+    #[serde(default)]
+    pub press: Option<Press>,
     /// The content.
     #[serde(flatten)]
     pub said: Said,
@@ -183,6 +188,7 @@ impl Frame {
         Ok(Self {
             id: None,
             vehicle: None,
+            press: None,
             said,
         })
     }
@@ -350,6 +356,7 @@ mod tests {
                 Frame {
                     id: None,
                     vehicle: None,
+                    press: None,
                     said: Said::OperatorRequest(request)
                 },
                 "{text}"

@@ -182,7 +182,7 @@ export class Emergency {
     if (request.type === "emergency_all") this.#stops.cancelAll();
     else this.#stops.cancel(this.#link.vehicle);
     this.#clearings += 1;
-    const reason = await this.#link.ask(request);
+    const reason = await this.#link.ask({ ...request, press: this.#stops.press });
     this.#clearings -= 1;
     if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);

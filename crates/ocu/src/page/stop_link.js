@@ -23,6 +23,8 @@ export class StopLink extends EventTarget {
   #stops = new Map();
   #timer = 0;
   #repeats = 0;
+  /** A number of this page, and how often a stop was pressed: a copy that is late is known by it. */
+  #press = [Math.floor(Math.random() * 2 ** 32), 0];
 
   /** Stops also by requests of `link`, whose token it shows to the station. */
   constructor(link, connect = () => new WebSocket(address(), link.protocols)) {
@@ -55,12 +57,17 @@ export class StopLink extends EventTarget {
 
   /** Stops a vehicle until `cancel`. */
   stop(subsystem) {
-    this.#begin(subsystem, `stop ${subsystem}`, { type: "emergency", on: true, vehicle: subsystem });
+    this.#begin(subsystem, `stop ${subsystem}`, { type: "emergency", vehicle: subsystem });
   }
 
   /** Stops all vehicles until `cancel`. */
   stopAll() {
-    this.#begin("all", "stop-all", { type: "emergency_all", on: true });
+    this.#begin("all", "stop-all", { type: "emergency_all" });
+  }
+
+  /** The last press: with its clearing, the station ignores what comes late of it and of those before. */
+  get press() {
+    return [...this.#press];
   }
 
   /** Whether the stop of a subsystem or `all` is repeated. */
@@ -86,7 +93,9 @@ export class StopLink extends EventTarget {
 
   #begin(target, frame, request) {
     clearTimeout(this.#timer);
-    this.#stops.set(target, { frame, request });
+    this.#press[1] += 1;
+    const press = this.press;
+    this.#stops.set(target, { frame: `${frame} ${press.join(".")}`, request: { ...request, on: true, press } });
     this.#repeats = 0;
     this.#repeat();
   }

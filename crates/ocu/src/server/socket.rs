@@ -23,6 +23,7 @@ use crate::orders::{
 };
 use crate::ownership::{Owner, PageId};
 use crate::page_link::{PageLink, Seen, TooOld};
+use crate::press::Press;
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::token::Token;
 use crate::users::UserRole;
@@ -253,7 +254,8 @@ impl Reader<'_> {
                 seen,
             }) => self.drive(frame.id, (forward, turn), seen).await,
             Said::OperatorRequest(request) => {
-                self.request(frame.id, frame.vehicle, request).await;
+                let meant = (frame.vehicle, frame.press);
+                self.request(frame.id, meant, request).await;
             }
         }
         None
@@ -352,7 +354,12 @@ impl Reader<'_> {
         let _ = self.shared.access.orders.send(Order::Drive(order)).await;
     }
 
-    async fn request(&mut self, id: Option<u64>, vehicle: Option<u16>, request: OperatorRequest) {
+    async fn request(
+        &mut self,
+        id: Option<u64>,
+        (vehicle, press): (Option<u16>, Option<Press>),
+        request: OperatorRequest,
+    ) {
         let reply = self.recorded(id, vehicle, request);
         let may_drive = self.visitor.may(UserRole::Drive);
         let needed = request.needs(self.shared.admission.gate.users().is_some());
@@ -371,6 +378,7 @@ impl Reader<'_> {
             let user = Arc::clone(&self.visitor.user);
             let order = StopOrder {
                 target,
+                press,
                 user,
                 reply,
             };
@@ -380,6 +388,7 @@ impl Reader<'_> {
                 page: self.page,
                 vehicle,
                 request,
+                press,
                 may_drive,
                 reply,
             };

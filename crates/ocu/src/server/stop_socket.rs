@@ -1,8 +1,8 @@
 //! The WebSockets that carry nothing but stops, so that these wait for no other frame. The right to
 //! observe suffices.
 //!
-//! A page sends `stop SUBSYSTEM` or `stop-all`, and repeats it until the vehicles have confirmed the
-//! emergency. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle,
+//! A page sends `stop SUBSYSTEM PRESS` or `stop-all PRESS`, and repeats it until the vehicles have confirmed
+//! the emergency. The [press](crate::press), which may be left out, tells copies from new stops. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle,
 //! or `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an
 //! empty frame every 10 s.
 
@@ -19,6 +19,7 @@ use super::bounds::{Bucket, FRAMES};
 use super::socket::{Parting, supervise};
 use super::visitor::Visitor;
 use crate::orders::{StopOrder, StopReply, StopTarget};
+use crate::press::Press;
 use crate::request::OperatorRequest;
 use crate::users::UserRole;
 use jaus::node::now;
@@ -117,13 +118,7 @@ impl<'s> Stops<'s> {
     }
 
     async fn stop(&self, text: &str) -> Option<Parting> {
-        let target = match text.split_once(' ') {
-            _ if text.len() > LARGEST => None,
-            None if text == "stop-all" => Some(None),
-            Some(("stop", number)) => number.parse().ok().map(Some),
-            _ => None,
-        };
-        let Some(vehicle) = target else {
+        let Some((vehicle, press)) = read(text) else {
             return Some((close_code::POLICY, "stop SUBSYSTEM or stop-all"));
         };
         if let Some(gate) = self.shared.admission.gate.users()
@@ -137,6 +132,7 @@ impl<'s> Stops<'s> {
         }
         let order = StopOrder {
             target: vehicle.map_or(StopTarget::All, StopTarget::Vehicle),
+            press,
             user: Arc::clone(&self.visitor.user),
             reply: self.reply(vehicle),
         };
@@ -170,5 +166,47 @@ impl<'s> Stops<'s> {
 
     fn answer(&self, answer: String) {
         let _ = self.answers.try_send(answer);
+    }
+}
+
+/// The vehicle of a stop, `None` for all, and the press.
+fn read(text: &str) -> Option<(Option<u16>, Option<Press>)> {
+    if text.len() > LARGEST {
+        return None;
+    }
+    let mut words = text.split(' ');
+    let vehicle = match words.next()? {
+        "stop" => Some(words.next()?.parse().ok()?),
+        "stop-all" => None,
+        _ => return None,
+    };
+    let press = words.next().map(str::parse).transpose().ok()?;
+    words.next().is_none().then_some((vehicle, press))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_names_a_vehicle_or_all_and_perhaps_a_press() {
+        assert_eq!(read("stop 101"), Some((Some(101), None)));
+        assert_eq!(read("stop-all"), Some((None, None)));
+        let press = "4294967295.4294967295".parse().ok();
+        assert!(press.is_some());
+        let longest = "stop 65535 4294967295.4294967295";
+        assert_eq!(read(longest), Some((Some(65_535), press)));
+        assert_eq!(read("stop-all 4294967295.4294967295"), Some((None, press)));
+        for wrong in [
+            "",
+            "stop",
+            "stop x",
+            "stop 65536",
+            "stop 1 2",
+            "stop 1 2.3 4",
+            "go 1",
+        ] {
+            assert_eq!(read(wrong), None, "{wrong}");
+        }
     }
 }

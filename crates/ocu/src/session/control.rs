@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::Session;
-use super::client::{Cleared, Client, release_all};
+use super::client::{Client, release_all};
 use super::lease::Wanted;
 use super::vehicle::Vehicle;
 use crate::orders::{OpenedPage, Order, Reply};
@@ -26,11 +26,18 @@ impl Session {
                 page,
                 vehicle,
                 request,
+                press,
                 may_drive,
                 reply,
             } => match request {
                 OperatorRequest::Select { subsystem } => {
                     reply(self.select(now, page, subsystem, may_drive));
+                }
+                OperatorRequest::Emergency { on: false }
+                | OperatorRequest::EmergencyAll { on: false }
+                | OperatorRequest::ClearAnyEmergency => {
+                    let vehicle = vehicle.or(self.pages.vehicle(page));
+                    self.clear(now, (vehicle, press), request, &self.user(page), reply);
                 }
                 _ => self.handle_request(now, page, vehicle, request, reply),
             },
@@ -109,18 +116,6 @@ impl Session {
     ) {
         let shown = self.pages.vehicle(page);
         match request {
-            OperatorRequest::Emergency { on: false } => {
-                self.note_emergency(now, meant.or(shown), &self.user(page), false);
-                return self.clear_emergency(now, meant.or(shown), Cleared::Own, reply);
-            }
-            OperatorRequest::ClearAnyEmergency => {
-                self.note_emergency(now, meant.or(shown), &self.user(page), false);
-                return self.clear_emergency(now, meant.or(shown), Cleared::Any, reply);
-            }
-            OperatorRequest::EmergencyAll { on: false } => {
-                self.note_emergency_of_all(now, &self.user(page), false);
-                return self.clear_all_emergencies(now, reply);
-            }
             OperatorRequest::Handover {
                 part,
                 operator,

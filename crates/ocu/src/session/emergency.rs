@@ -1,6 +1,7 @@
 //! Emergencies of one vehicle and of all. Every page may set one at any time, also if another page
 //! owns the vehicle.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use tokio::sync::oneshot;
@@ -10,23 +11,30 @@ use super::client::{Cleared, Client, Finished};
 use super::control::{NO_VEHICLE, in_words};
 use super::vehicle::Vehicle;
 use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
+use crate::press::Press;
+use crate::request::OperatorRequest;
 
 impl Session {
     /// Sends an emergency at once.
     pub(super) fn handle_stop(&mut self, now: Instant, order: StopOrder) {
         let StopOrder {
             target,
+            press,
             user,
             reply,
         } = order;
-        let number = match target {
-            StopTarget::OfPage(page) => self.pages.vehicle(page),
-            StopTarget::Vehicle(number) => Some(number),
-            StopTarget::All => {
-                self.stop_all(now, reply);
-                return self.note_emergency_of_all(now, &user, true);
-            }
+        let (all, number) = match target {
+            StopTarget::OfPage(page) => (false, self.pages.vehicle(page)),
+            StopTarget::Vehicle(number) => (false, Some(number)),
+            StopTarget::All => (true, None),
         };
+        if (all || number.is_some()) && press.is_some_and(|it| self.cleared.contains(it, number)) {
+            return reply.ignored();
+        }
+        if all {
+            self.stop_all(now, reply);
+            return self.note_emergency_of_all(now, &user, true);
+        }
         self.note_emergency(now, number, &user, true);
         let vehicle = number.and_then(|number| self.fleet.get_mut(number));
         let vehicle = vehicle.filter(|it| it.has_managed());
@@ -65,15 +73,36 @@ impl Session {
         }
     }
 
-    /// Clears the emergency of a vehicle. If it was the last one after a stop of all, vehicles that
-    /// appear later are not stopped either: nothing would show why.
-    pub(super) fn clear_emergency(
+    /// Handles a request to clear emergencies of a vehicle or of all. Copies of the page's presses up to
+    /// `press` that are still on their way stop nothing any more.
+    pub(super) fn clear(
         &mut self,
         now: Instant,
-        number: Option<u16>,
-        whose: Cleared,
+        (vehicle, press): (Option<u16>, Option<Press>),
+        request: OperatorRequest,
+        user: &Arc<str>,
         reply: Reply,
     ) {
+        let is_of_all = matches!(request, OperatorRequest::EmergencyAll { .. });
+        let target = vehicle.filter(|_| !is_of_all);
+        if let Some(press) = press.filter(|_| is_of_all || target.is_some()) {
+            self.cleared.add(press, target);
+        }
+        if is_of_all {
+            self.note_emergency_of_all(now, user, false);
+            return self.clear_all_emergencies(now, reply);
+        }
+        let whose = match request {
+            OperatorRequest::ClearAnyEmergency => Cleared::Any,
+            _ => Cleared::Own,
+        };
+        self.note_emergency(now, vehicle, user, false);
+        self.clear_emergency(now, vehicle, whose, reply);
+    }
+
+    /// Clears the emergency of a vehicle. If it was the last one after a stop of all, vehicles that
+    /// appear later are not stopped either: nothing would show why.
+    fn clear_emergency(&mut self, now: Instant, number: Option<u16>, whose: Cleared, reply: Reply) {
         let Some(vehicle) = number.and_then(|number| self.fleet.get_mut(number)) else {
             return reply(Err(NO_VEHICLE.to_owned()));
         };
@@ -86,7 +115,7 @@ impl Session {
     }
 
     /// Clears the emergencies of all vehicles, and ends the stop of those that appear later.
-    pub(super) fn clear_all_emergencies(&mut self, now: Instant, reply: Reply) {
+    fn clear_all_emergencies(&mut self, now: Instant, reply: Reply) {
         self.all_stopped = false;
         let mut cleared: Vec<&mut Vehicle> = Vec::new();
         for vehicle in self.fleet.iter_mut().filter(|it| it.is_stopped()) {

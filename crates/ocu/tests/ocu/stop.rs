@@ -59,6 +59,34 @@ async fn a_stop_acts_without_waiting_for_anything_that_the_page_has_sent_before(
 }
 
 #[tokio::test]
+async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    let mut page = scene.driver().await;
+    for (stop, clear, answer) in [
+        ("stop 101", "emergency", "ok 101"),
+        ("stop-all", "emergency_all", "ok all"),
+    ] {
+        let pressed = |press: u32| format!("{stop} 7.{press}");
+        assert_eq!(say(&mut socket, &pressed(1)).await, answer);
+        scene.until(emergency).await;
+        page.ask(json!({"type": clear, "on": false, "press": [7, 1]}))
+            .await
+            .unwrap();
+        scene.until(|scene| !emergency(scene)).await;
+        assert_eq!(say(&mut socket, &pressed(1)).await, answer, "a late copy");
+        page.ask(json!({"type": "standby"})).await.unwrap();
+        assert!(!emergency(&scene), "{stop}");
+        for new in [&pressed(2), stop] {
+            assert_eq!(say(&mut socket, new).await, answer, "a new one");
+            scene.until(emergency).await;
+            page.ask(json!({"type": clear, "on": false})).await.unwrap();
+            scene.until(|scene| !emergency(scene)).await;
+        }
+    }
+}
+
+#[tokio::test]
 async fn all_vehicles_are_stopped_by_one_frame() {
     let scene = Scene::new().await;
     let second = scene.another_vehicle(102);

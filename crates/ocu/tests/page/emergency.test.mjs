@@ -72,7 +72,7 @@ function page({ vehicle = 101, barred = "" } = {}) {
     repeated: () => {
       Socket.all.forEach(({ sent }) => sent.splice(0));
       for (let round = 0; round < 4; round++) mock.timers.tick(500);
-      return [...new Set(Socket.all.flatMap(({ sent }) => sent))].sort();
+      return [...new Set(Socket.all.flatMap(({ sent }) => sent.map((frame) => frame.replace(/ \d+\.\d+$/, ""))))].sort();
     },
   };
 }

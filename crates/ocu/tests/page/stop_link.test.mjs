@@ -36,8 +36,12 @@ function rig(token = "") {
     return sockets.at(-1);
   });
   stops.start();
-  return { stops, sockets, requests, sent: () => sockets.map(({ sent }) => sent.splice(0)) };
+  /** What was sent, without the presses. */
+  const sent = () => sockets.map(({ sent }) => sent.splice(0).map((frame) => frame.replace(PRESS, "")));
+  return { stops, sockets, requests, sent };
 }
+
+const PRESS = / \d+\.\d+$/;
 
 test.afterEach(() => mock.timers.reset());
 
@@ -54,6 +58,25 @@ test("a stop goes out on every connection at once, and is repeated until it is c
   stops.cancel(101);
   mock.timers.tick(3_000);
   assert.deepEqual(sent(), [[], []]);
+});
+
+test("copies of a stop carry its press, and the next stop has another one", () => {
+  const { stops, sockets } = rig();
+  sockets.forEach((socket) => socket.open());
+  const presses = () => {
+    mock.timers.tick(1_000);
+    const frames = sockets.flatMap(({ sent }) => sent.splice(0));
+    return [...new Set(frames.map((frame) => frame.match(/\d+\.\d+$/)[0]))];
+  };
+  stops.stop(101);
+  const first = presses();
+  assert.deepEqual(first, [stops.press.join(".")]);
+  stops.cancel(101);
+  stops.stop(101);
+  const second = presses();
+  assert.deepEqual(second, [stops.press.join(".")]);
+  assert.notDeepEqual(first, second);
+  assert.ok(`stop 65535 ${2 ** 32 - 1}.${2 ** 32 - 1}`.length <= 32, "the station takes no longer frame");
 });
 
 test("without a connection of its own, a stop takes the other one and the next that opens", () => {
