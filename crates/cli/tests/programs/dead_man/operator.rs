@@ -30,6 +30,15 @@ impl Source {
             Self::Gamepad => "gamepad",
         }
     }
+
+    /// When a hand that holds it has shown that it is still there: a key by its first repetition, for which the page
+    /// waits longer than for the others.
+    const fn first_sign(self) -> Duration {
+        match self {
+            Self::Keys => Duration::from_millis(750),
+            Self::Mouse | Self::Touch | Self::Gamepad => Duration::ZERO,
+        }
+    }
 }
 
 /// What happens to what is held.
@@ -287,8 +296,10 @@ impl<'a> Operator<'a> {
         let deadline = Instant::now() + Duration::from_secs(8);
         while Instant::now() < deadline {
             self.hold(source);
-            let left = deadline.saturating_duration_since(Instant::now());
-            if within(left.min(Duration::from_secs(3)), &is_driven) {
+            let begun = Instant::now();
+            let left = deadline.saturating_duration_since(begun);
+            let is_held = || begun.elapsed() >= source.first_sign() && is_driven();
+            if within(left.min(Duration::from_secs(3)), is_held) {
                 return true;
             }
             self.let_go(source);
