@@ -91,18 +91,9 @@ impl Mishaps {
         let page = world.random.below(2);
         let vehicle = world.random.below(2);
         match world.random.below(14) {
-            0 if !world.pages[page].cable.is_cut() => {
-                world.trace(|| format!("page {page}: cut"));
-                let now = world.now;
-                world.pages[page].cable.cut(now);
-                self.later(world, 50, 3000, End::Cable(page));
-            }
+            0 => self.cut(world, page),
             1 => self.break_connections(world, page),
-            2 if world.host(STATION).is_alive() => {
-                world.trace(|| "the station is killed".to_owned());
-                world.kill_station();
-                self.later(world, 1, 400, End::Station);
-            }
+            2 if world.host(STATION).is_alive() => self.kill_station(world),
             3 if world.host(1 + vehicle).is_alive() => {
                 world.trace(|| format!("vehicle {vehicle} is killed"));
                 world.kill_vehicle(vehicle);
@@ -151,6 +142,35 @@ impl Mishaps {
             // Nothing.
             _ => {}
         }
+    }
+
+    /// The operator of a page stops its vehicle, and what carries the stop fails at that moment.
+    pub(crate) fn strike(&mut self, world: &mut World, page: usize) {
+        let fault = world.random.below(4);
+        if fault == 0 {
+            self.cut(world, page);
+        }
+        world.stop(page);
+        match fault {
+            0 | 1 => self.break_connections(world, page),
+            2 if world.host(STATION).is_alive() => self.kill_station(world),
+            _ => {}
+        }
+    }
+
+    fn cut(&mut self, world: &mut World, page: usize) {
+        if !world.pages[page].cable.is_cut() {
+            world.trace(|| format!("page {page}: cut"));
+            let now = world.now;
+            world.pages[page].cable.cut(now);
+            self.later(world, 50, 3000, End::Cable(page));
+        }
+    }
+
+    fn kill_station(&mut self, world: &mut World) {
+        world.trace(|| "the station is killed".to_owned());
+        world.kill_station();
+        self.later(world, 1, 400, End::Station);
     }
 
     /// The connections of a page break; the station learns of it later.

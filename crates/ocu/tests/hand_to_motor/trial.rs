@@ -57,7 +57,7 @@ pub(crate) fn run_rough(seed: u64) -> Outcome {
     outcome(world)
 }
 
-/// A trial in which somebody stops a vehicle while things go wrong, and nobody clears it: the stop arrives,
+/// A trial in which somebody stops a vehicle just as things go wrong, and nobody clears it: the stop arrives,
 /// and holds against every hand.
 pub(crate) fn run_stopped(seed: u64) -> Outcome {
     let mut world = World::new(seed, [1.0; 5]);
@@ -69,7 +69,7 @@ pub(crate) fn run_stopped(seed: u64) -> Outcome {
             operators
                 .iter_mut()
                 .for_each(|it| it.intent = Intent::Nothing);
-            world.stop(page);
+            mishaps.strike(&mut world, page);
         }
         mishaps.live(&mut world);
         live(&mut world, &mut operators);

@@ -87,6 +87,9 @@ impl<'a> Measurement<'a> {
             _ => None,
         };
         let cell = self.finish(name, link.emergency_limit(), link, BY_HAND, ending);
+        // Copies of the stop that come late are known to the station by the page that has pressed it.
+        self.operator.let_go(source);
+        self.operator.clear_emergency();
         Cell { emergency, ..cell }
     }
 

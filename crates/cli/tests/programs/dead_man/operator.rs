@@ -240,7 +240,8 @@ impl<'a> Operator<'a> {
             .wait("document.querySelectorAll('#parts .part').length >= 4");
     }
 
-    fn clear_emergency(&mut self) {
+    /// Clears the emergency if there is one.
+    pub(crate) fn clear_emergency(&mut self) {
         if self.browser.value(IS_IN_EMERGENCY) == true {
             self.browser.press("#estop-clear");
             self.browser.press("#clear-yes");

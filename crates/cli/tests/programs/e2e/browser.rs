@@ -22,6 +22,8 @@ static BROWSERS: AtomicU32 = AtomicU32::new(0);
 const LIMIT: Duration = Duration::from_secs(60);
 /// Polling interval of a condition.
 const PERIOD: Duration = Duration::from_millis(50);
+/// How long something may lie over a button.
+const COVERED: Duration = Duration::from_secs(6);
 /// Delay of a held key's first repeat, and of each further one.
 const REPEATS: [Duration; 2] = [Duration::from_millis(250), Duration::from_millis(33)];
 
@@ -394,12 +396,14 @@ impl Browser {
              const top = document.elementFromPoint(x, y); \
              return {{ x, y, free: e === top || e.contains(top) }}; }})()"
         );
-        // What the state shows and hides beside a button moves it: a hand waits until it rests.
+        // What the state shows and hides beside a button moves it, and a notice may lie over it for a while: a hand waits
+        // until it rests and is free.
         let mut middle = self.value(&measure);
-        for _ in 0..20 {
+        let deadline = Instant::now() + COVERED;
+        while Instant::now() < deadline {
             std::thread::sleep(PERIOD);
             let before = std::mem::replace(&mut middle, self.value(&measure));
-            if before == middle {
+            if before == middle && middle["free"] == true {
                 break;
             }
         }
