@@ -12,6 +12,7 @@ use crate::messages::core::{
     ConfirmControl, QueryAuthority, QueryControl, QueryTimeout, RejectControl, ReleaseControl,
     ReportAuthority, ReportControl, ReportTimeout, RequestControl, SetAuthority,
 };
+use crate::service::order::number_of;
 use crate::service::{Controller, Handled, Outbox, State};
 
 impl Control {
@@ -93,6 +94,7 @@ impl Control {
             id: client,
             authority,
         });
+        self.requested = number_of(message);
         self.renew(now);
         confirm(message, Confirmation::CONTROL_ACCEPTED, out);
     }
@@ -171,11 +173,16 @@ impl Control {
 
     /// Ends control without a word. A ready component falls back to standby.
     pub(super) fn end_control(&mut self) -> Option<Controller> {
-        self.deadline = None;
+        (self.deadline, self.requested) = (None, None);
+        self.fall_back();
+        self.standing.controller.take()
+    }
+
+    /// A ready component falls back to standby.
+    pub(super) fn fall_back(&mut self) {
         if self.management.is_some() && self.standing.state == State::Ready {
             self.standing.state = State::Standby;
         }
-        self.standing.controller.take()
     }
 }
 

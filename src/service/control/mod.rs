@@ -47,11 +47,12 @@ mod tests;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use super::order::{REACH, number_of};
 use super::{Handled, Outbox, Standing, State, code_of, read};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
-use crate::messages::core::{self, report_timeout};
+use crate::messages::core::{self, QueryIncarnation, RequestControl, report_timeout};
 
 /// Settings of Access Control.
 ///
@@ -164,6 +165,8 @@ pub(super) struct Control {
     standing: Standing,
     /// When control ends unless it is renewed.
     deadline: Option<Instant>,
+    /// The number of the last request by which the client in control got or renewed it.
+    requested: Option<u16>,
     /// The clients that have set an emergency and not cleared it.
     emergencies: BTreeSet<JausId>,
     /// Whether more emergencies were set than the table holds.
@@ -259,11 +262,24 @@ impl Control {
         }
     }
 
-    /// Ends the control of a client that has restarted, which knows of none.
-    pub(super) fn end_control_of(&mut self, client: JausId) {
-        if self.is_controller(client) {
-            self.end_control();
+    /// Ends the control of a client that has restarted, as its message shows.
+    pub(super) fn handle_restarted(&mut self, message: &Received, out: &mut Outbox) {
+        if !self.is_controller(message.source) {
+            return;
         }
+        match code_of(&message.payload) {
+            // Its request has overtaken the introduction: it is in control, and must resume.
+            Some(QueryIncarnation::CODE) if self.was_requested_after(message) => self.fall_back(),
+            // It knows of no control, and a rejection could overtake the answer to its request.
+            Some(QueryIncarnation::CODE | RequestControl::CODE) => _ = self.end_control(),
+            _ => self.drop_controller(out),
+        }
+    }
+
+    fn was_requested_after(&self, message: &Received) -> bool {
+        let numbers = self.requested.zip(number_of(message));
+        numbers
+            .is_some_and(|(requested, number)| (1..REACH).contains(&requested.wrapping_sub(number)))
     }
 
     pub(super) fn is_controller(&self, client: JausId) -> bool {

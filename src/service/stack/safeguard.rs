@@ -5,10 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use super::Stack;
-use crate::codec::Message;
 use crate::endpoint::Received;
-use crate::messages::core::RequestControl;
-use crate::service::code_of;
 use crate::service::control::Condition;
 use crate::service::life::Rank;
 use crate::service::safety;
@@ -125,11 +122,8 @@ impl Stack {
     }
 
     /// Ends the motion and the control of clients that have restarted: the new incarnation is a new
-    /// client. It is told, in case that it is still the one that was in control, unless the message
-    /// that shows the restart says otherwise.
+    /// client.
     pub(super) fn end_control_of_restarted(&mut self, now: Instant, message: &Received) {
-        let is_certain = Incarnation::told_in(&message.payload).is_some()
-            || code_of(&message.payload) == Some(RequestControl::CODE);
         while let Some(client) = self.life.poll_restarted() {
             self.order.forget(client);
             let is_moving = self
@@ -141,11 +135,7 @@ impl Stack {
             }
             tracing::warn!(id = %self.out.source(), %client, "the client in control has restarted");
             self.stop(&StopCause::Restarted(client));
-            if is_certain {
-                self.control.end_control_of(client);
-            } else {
-                self.control.forget(client, &mut self.out);
-            }
+            self.control.handle_restarted(message, &mut self.out);
             self.follow_control(now);
         }
     }

@@ -183,6 +183,27 @@ fn a_new_incarnation_that_requests_control_at_once_begins_in_standby() {
 }
 
 #[test]
+fn a_new_incarnation_whose_request_arrives_before_its_introduction_keeps_control_in_standby() {
+    let mut rig = Rig::driven();
+    rig.number = Some(51);
+    rig.request(FIRST, 100);
+    assert_eq!(rig.state(), State::Ready, "it looks like a renewal");
+    rig.number = Some(50);
+    let said = rig.introduce(FIRST, NEW);
+    let end = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    assert!(!said.contains(&end));
+    let now = (rig.state(), rig.controller());
+    assert_eq!(now, (State::Standby, Some((FIRST, 100))));
+}
+
+#[test]
+fn a_new_incarnation_that_only_answers_is_told_that_its_control_has_ended() {
+    let mut rig = Rig::driven();
+    let said = rig.hear(FIRST, &ReportIncarnation { incarnation: NEW });
+    assert_eq!(said, [rejected(FIRST, Rejection::CONTROL_RELEASED)]);
+}
+
+#[test]
 fn a_client_without_the_service_is_never_asked() {
     let mut rig = Rig::ready();
     let asked = rig.answer_for(Duration::from_secs(2), FIRST, OLD);
