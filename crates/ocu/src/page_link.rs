@@ -369,6 +369,26 @@ mod tests {
     }
 
     #[test]
+    fn no_state_is_left_out_on_a_long_link_whose_confirmations_go_with_setpoints() {
+        let (mut link, start) = (PageLink::default(), Instant::now());
+        let mut left_out = 0;
+        for period in 0..300 {
+            let now = start + ms(100 * period);
+            // A state is confirmed by the next setpoint, at most 100 ms and a frame later.
+            if let Some(seq) = period.checked_sub(8) {
+                let confirmed = start + ms(100 * seq + 720);
+                let _ = link.handle_seen(confirmed, seen(seq, 120));
+            }
+            match link.may_send(now) {
+                true => link.handle_sent(now, period, ROVER),
+                // The window grows in the beginning.
+                false => left_out += u32::from(period > 100),
+            }
+        }
+        assert_eq!(left_out, 0);
+    }
+
+    #[test]
     fn a_setpoint_that_was_held_up_for_more_than_300_ms_is_refused() {
         let (mut link, now, seq) = link(20);
         let waited = link.handle_setpoint(now + ms(200), seen(seq, 0), ROVER);

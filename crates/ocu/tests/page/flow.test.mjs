@@ -86,6 +86,16 @@ test("while a setpoint is under way, the next one confirms the state as well", (
   assert.deepEqual(it.taken(), ["[3,0]"], "without a setpoint, the state is confirmed alone");
 });
 
+test("after a drive, states are confirmed at once although its last frames are still under way", () => {
+  const it = rig();
+  it.flow.shown(1);
+  it.flow.setpoint(push(0.5));
+  it.flow.release();
+  it.taken();
+  it.flow.shown(2);
+  assert.deepEqual(it.taken(), ["[2,0]"]);
+});
+
 test("frames are small", () => {
   const it = rig();
   it.flow.shown(1234567);

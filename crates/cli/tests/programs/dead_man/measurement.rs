@@ -166,12 +166,16 @@ impl<'a> Measurement<'a> {
             // The event comes as long as the drive lasts.
             if link.is_lossy() {
                 let is_driven = || motors.drove_at(Instant::now());
-                if self.operator.drive(source, is_driven) {
+                let held = held.min(source.first_sign());
+                if self.operator.drive(source, held, is_driven) {
                     return Drive::On;
                 }
                 break;
             }
-            if !self.operator.drive(source, || motors.drive()) {
+            if !self
+                .operator
+                .drive(source, Duration::ZERO, || motors.drive())
+            {
                 break;
             }
             let begun = Instant::now();

@@ -33,7 +33,7 @@ impl Source {
 
     /// When a hand that holds it has shown that it is still there: a key by its first repetition, for which the page
     /// waits longer than for the others.
-    const fn first_sign(self) -> Duration {
+    pub(crate) const fn first_sign(self) -> Duration {
         match self {
             Self::Keys => Duration::from_millis(750),
             Self::Mouse | Self::Touch | Self::Gamepad => Duration::ZERO,
@@ -292,14 +292,20 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Holds a source until the vehicle is driven, with a few attempts: the link may end a drive. Returns whether it is.
-    pub(crate) fn drive(&mut self, source: Source, is_driven: impl Fn() -> bool) -> bool {
+    /// Holds a source for some time, until the vehicle is driven, with a few attempts: the link may end a drive. Returns
+    /// whether it is.
+    pub(crate) fn drive(
+        &mut self,
+        source: Source,
+        held: Duration,
+        is_driven: impl Fn() -> bool,
+    ) -> bool {
         let deadline = Instant::now() + Duration::from_secs(8);
         while Instant::now() < deadline {
             self.hold(source);
             let begun = Instant::now();
             let left = deadline.saturating_duration_since(begun);
-            let is_held = || begun.elapsed() >= source.first_sign() && is_driven();
+            let is_held = || begun.elapsed() >= held && is_driven();
             if within(left.min(Duration::from_secs(3)), is_held) {
                 return true;
             }
