@@ -5,7 +5,7 @@ import { number, plain } from "./dom.js";
 import { Flow } from "./flow.js";
 
 const FIRST_PAUSE = 500;
-const LONGEST_PAUSE = 8_000;
+const LONGEST_PAUSE = 4_000;
 /** A state older than this is stale. */
 export const STALE = 1_000;
 /** A connection that says nothing for so long is given up. */

@@ -1,13 +1,17 @@
 //! Clients that restart, faster than any silence limit.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 use super::*;
+use crate::codec::ServiceId;
 use crate::endpoint::{Outgoing, Received};
 use crate::service::life::Life;
 use crate::service::stack_rig::US;
-use crate::service::{Discovery, Handlers, Kind, Profile, Scope, Timing};
+use crate::service::{
+    Context, Discovery, Handled, Handlers, Kind, Profile, Scope, Service, StopCause, Timing,
+};
 use crate::wire::{Broadcast, Priority};
 
 /// The numbers of two starts of a client.
@@ -260,6 +264,35 @@ fn moving() -> (Rig, Arc<AtomicU32>) {
         stack.management(Management::new())
     });
     (rig.drive(), commands)
+}
+
+/// Notes why it was stopped.
+struct Stopped(Arc<Mutex<Vec<StopCause>>>);
+
+impl Service for Stopped {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![list_manager::LATEST]
+    }
+
+    fn handle_message(&mut self, _: Instant, _: &Received, _: &mut Context<'_>) -> Handled {
+        Handled::No
+    }
+
+    fn handle_stop(&mut self, cause: &StopCause, _: &mut Context<'_>) {
+        self.0.lock().unwrap().push(cause.clone());
+    }
+}
+
+#[test]
+fn what_moves_is_told_that_its_client_has_restarted() {
+    let causes = Arc::new(Mutex::new(Vec::new()));
+    let service = Box::new(Stopped(Arc::clone(&causes)));
+    let rig = Rig::new(vec![service], |stack| stack.management(Management::new()));
+    let mut rig = rig.drive();
+    causes.lock().unwrap().clear();
+    rig.introduce(FIRST, NEW);
+    let first = causes.lock().unwrap().first().cloned();
+    assert_eq!(first, Some(StopCause::Restarted(FIRST)));
 }
 
 #[test]

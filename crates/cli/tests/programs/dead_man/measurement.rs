@@ -16,6 +16,10 @@ const MISSION: f64 = 0.1;
 pub(crate) const HELD: Duration = Duration::from_secs(2);
 /// How long the motors are observed after an event: what is retransmitted over a link that loses packets comes so late.
 const WATCH: Duration = Duration::from_millis(3500);
+/// How long a link loses packets before a stop, and how long the motors are still after it.
+const LOSING: Duration = Duration::from_secs(1);
+/// The longest time that is waited for an emergency.
+const LONGEST: Duration = Duration::from_secs(20);
 /// Over a link that loses nothing, nothing comes after the motors have been still for so long.
 const STILL: Duration = Duration::from_millis(1500);
 /// A link that loses packets may end each drive before something happens to it.
@@ -90,6 +94,42 @@ impl<'a> Measurement<'a> {
         // Copies of the stop that come late are known to the station by the page that has pressed it.
         self.operator.let_go(source);
         self.operator.clear_emergency();
+        Cell { emergency, ..cell }
+    }
+
+    /// A key drives, the link begins to lose packets, and the operator stops the vehicle at once. Whether the drive lasts
+    /// so long is up to the link; the emergency is measured all the same.
+    pub(crate) fn stop_while_losing(&mut self, link: Link) -> Cell {
+        let bed = self.bed;
+        let motors = &bed.motors;
+        if !self.operator.is_intact() {
+            self.operator.open();
+        }
+        self.operator.engage();
+        let is_driven = self
+            .operator
+            .drive(Source::Keys, Duration::ZERO, || motors.drive());
+        assert!(is_driven, "over a free link");
+        bed.link.set(link.conditions);
+        sleep(LOSING);
+        let pressed = SystemTime::now();
+        let event = self.operator.stop(Stop::Escape);
+        // A log that ends with an emergency of before gives the time until the next day.
+        let acted = || bed.emergency_after(pressed).filter(|it| *it < LONGEST);
+        within(LONGEST, || acted().is_some() && motors.are_still(LOSING));
+        let emergency = acted();
+        // At once, if the drive had ended.
+        let ending = Ending::Stopped(motors.stopped(event));
+        self.emergency_is_seen();
+        let cell = self.finish(
+            format!("Escape, {}", link.name),
+            link.emergency_limit(),
+            link,
+            BY_HAND,
+            ending,
+        );
+        self.operator.clear_emergency();
+        println!("emergency: {emergency:.2?}");
         Cell { emergency, ..cell }
     }
 

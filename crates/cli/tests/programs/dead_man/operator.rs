@@ -242,6 +242,9 @@ impl<'a> Operator<'a> {
 
     /// Clears the emergency if there is one.
     pub(crate) fn clear_emergency(&mut self) {
+        // A link that has just been mended may not have brought it yet.
+        let is_known = format!("{IS_IN_EMERGENCY} || {IS_NO_EMERGENCY}");
+        self.browser.wait(&is_known);
         if self.browser.value(IS_IN_EMERGENCY) == true {
             self.browser.press("#estop-clear");
             self.browser.press("#clear-yes");
