@@ -16,8 +16,6 @@ const MISSION: f64 = 0.1;
 pub(crate) const HELD: Duration = Duration::from_secs(2);
 /// How long the motors are observed after an event: what is retransmitted over a link that loses packets comes so late.
 const WATCH: Duration = Duration::from_millis(3500);
-/// How long a link loses packets before a stop, and how long the motors are still after it.
-const LOSING: Duration = Duration::from_secs(1);
 /// The longest time that is waited for an emergency.
 const LONGEST: Duration = Duration::from_secs(20);
 /// Over a link that loses nothing, nothing comes after the motors have been still for so long.
@@ -97,9 +95,9 @@ impl<'a> Measurement<'a> {
         Cell { emergency, ..cell }
     }
 
-    /// A key drives, the link begins to lose packets, and the operator stops the vehicle at once. Whether the drive lasts
-    /// so long is up to the link; the emergency is measured all the same.
-    pub(crate) fn stop_while_losing(&mut self, link: Link) -> Cell {
+    /// A key drives, the link begins to lose packets, and some time later the operator stops the vehicle at once. Whether
+    /// the drive lasts so long is up to the link; the emergency is measured all the same.
+    pub(crate) fn stop_while_losing(&mut self, link: Link, losing: Duration) -> Cell {
         let bed = self.bed;
         let motors = &bed.motors;
         if !self.operator.is_intact() {
@@ -111,12 +109,12 @@ impl<'a> Measurement<'a> {
             .drive(Source::Keys, Duration::ZERO, || motors.drive());
         assert!(is_driven, "over a free link");
         bed.link.set(link.conditions);
-        sleep(LOSING);
+        sleep(losing);
         let pressed = SystemTime::now();
         let event = self.operator.stop(Stop::Escape);
-        // A log that ends with an emergency of before gives the time until the next day.
+        // If the log ends with an emergency of before, it seems to have begun almost a day later.
         let acted = || bed.emergency_after(pressed).filter(|it| *it < LONGEST);
-        within(LONGEST, || acted().is_some() && motors.are_still(LOSING));
+        within(LONGEST, || acted().is_some() && motors.are_still(STILL));
         let emergency = acted();
         // At once, if the drive had ended.
         let ending = Ending::Stopped(motors.stopped(event));

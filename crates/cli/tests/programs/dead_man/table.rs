@@ -12,6 +12,8 @@ use super::{all_are_met, on_a_bed};
 
 /// How often the operator stops the vehicle at once over each lossy link.
 const STOPS: usize = 200;
+/// How long the link has lost packets before: after some time it has ended most drives.
+const LOSING: [Duration; 2] = [Duration::from_millis(300), Duration::from_secs(1)];
 /// How long something is held before the operator stops the vehicle at once.
 const HELD: [Duration; 2] = [Duration::from_secs(2), Duration::from_secs(12)];
 /// Links of the table in its order.
@@ -189,7 +191,7 @@ fn repeated_stops(
             "limit",
         ],
     );
-    let measure = |_| measurement.stop_while_losing(link);
+    let measure = |stop| measurement.stop_while_losing(link, LOSING[stop % LOSING.len()]);
     let mut all: Vec<Cell> = (0..STOPS).map(measure).collect();
     all.sort_by_key(|it| it.emergency.unwrap_or(Duration::MAX));
     let nth = |index: usize| all[index].emergency.unwrap_or(Duration::MAX);
