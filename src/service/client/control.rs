@@ -358,11 +358,13 @@ impl Control {
     }
 
     fn ask(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+        // First the introduction, if there is one: before it the peer may take what comes for a sign
+        // that its old client has restarted, and reject that.
+        self.request(now, peer, out);
         if self.awaits_lifetime() {
             self.lifetime_asked += 1;
             out.send(peer, &QueryTimeout {});
         }
-        self.request(now, peer, out);
     }
 
     fn renew(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {

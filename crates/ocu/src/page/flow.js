@@ -98,8 +98,8 @@ export class Flow {
     this.#seenAt = this.#now();
     this.#unconfirmed = true;
     // During a drive the next setpoint confirms the state as well. After it, a long link would wait a
-    // round trip for that.
-    if (this.#underWay.length === 0 || !this.#driving) this.#confirm();
+    // round trip for that; one that queues does wait.
+    if (this.#underWay.length === 0 || !(this.#driving || this.#isOverdue)) this.#confirm();
   }
 
   /** The state `seq` has arrived, but the browser shows nothing now. */
@@ -143,6 +143,12 @@ export class Flow {
     this.#late = delay > DELAYED ? this.#late + 1 : 0;
     if (this.#late >= QUEUED) [this.#most, this.#restsUntil] = [1, now + Math.min(PAUSE * delay, LONGEST_PAUSE)];
     else if (this.#late === 0) this.#most = Math.min(this.#most + 1, MOST);
+  }
+
+  /** Whether the oldest frame under way should have been confirmed by now. */
+  get #isOverdue() {
+    const idle = this.#idle?.roundTrip ?? this.#estimate;
+    return this.#now() - (this.#underWay[0] ?? this.#now()) > idle + DELAYED;
   }
 
   #held() {

@@ -86,14 +86,19 @@ test("while a setpoint is under way, the next one confirms the state as well", (
   assert.deepEqual(it.taken(), ["[3,0]"], "without a setpoint, the state is confirmed alone");
 });
 
-test("after a drive, states are confirmed at once although its last frames are still under way", () => {
+test("after a drive, states are confirmed at once although its last frames are still under way, unless they are late", () => {
   const it = rig();
+  it.flow.estimate(600);
   it.flow.shown(1);
   it.flow.setpoint(push(0.5));
   it.flow.release();
   it.taken();
+  it.now = 700;
   it.flow.shown(2);
   assert.deepEqual(it.taken(), ["[2,0]"]);
+  it.now = 701;
+  it.flow.shown(3);
+  assert.deepEqual(it.taken(), [], "the link queues");
 });
 
 test("frames are small", () => {
