@@ -39,6 +39,11 @@ impl Session {
                     let vehicle = vehicle.or(self.pages.vehicle(page));
                     self.clear(now, (vehicle, press), request, &self.user(page), reply);
                 }
+                OperatorRequest::Handover {
+                    part,
+                    operator,
+                    grant,
+                } => self.decide_handover(now, page, (part, operator), grant, reply),
                 _ => self.handle_request(now, page, vehicle, request, reply),
             },
             Order::Drive(order) => {
@@ -115,14 +120,6 @@ impl Session {
         reply: Reply,
     ) {
         let shown = self.pages.vehicle(page);
-        match request {
-            OperatorRequest::Handover {
-                part,
-                operator,
-                grant,
-            } => return self.decide_handover(now, page, (part, operator), grant, reply),
-            _ => {}
-        }
         if let Some(meant) = meant.filter(|meant| shown != Some(*meant)) {
             return reply(Err(format!("vehicle {meant} is not selected any more")));
         }
