@@ -1,8 +1,8 @@
 //! The link between the station and one page: how old the picture is that the operator drives by,
 //! how long setpoints wait on the way, and how many states may be under way.
 //!
-//! The page confirms every state that it shows, and says for how long it has shown it. The time from
-//! sending a state to its confirmation, without the time shown, is a round trip. The shortest one of
+//! The page confirms every state that it shows, and says how long ago it arrived. The time from sending
+//! a state to its confirmation, without the time on the page, is a round trip. The shortest one of
 //! the last 10 s is that of an idle link; what a frame takes beyond it, it has waited.
 
 use std::collections::VecDeque;
@@ -17,7 +17,7 @@ pub struct Seen {
     /// Number of the state.
     #[serde(rename = "seen")]
     pub seq: u64,
-    /// How long the page has shown it, in milliseconds.
+    /// How long ago it arrived at the page, in milliseconds.
     pub held_ms: u64,
 }
 

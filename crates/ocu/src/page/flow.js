@@ -2,8 +2,8 @@
 // way as an idle link's round trip explains, and the newest replaces what waits. Every setpoint says
 // which state the operator has seen last and for how long, so that the station knows how old it is.
 //
-// Frames to the station: [seq, held] confirms that the state `seq` has been shown for `held`
-// milliseconds, [seq] that it has arrived but is not shown, and [seq, held, forward, turn] drives.
+// Frames to the station: [seq, held] confirms that the state `seq` is shown, `held` milliseconds after it
+// arrived, [seq] that it has arrived but is not shown, and [seq, held, forward, turn] drives.
 
 /** A setpoint that has waited this long is not sent any more, in milliseconds. */
 const LONGEST_WAIT = 200;
@@ -42,9 +42,9 @@ export class Flow {
   #waiting = null;
   /** Whether a setpoint was sent since the last release. */
   #driving = false;
-  /** The last state shown, and when. */
+  /** The last state shown, and when it arrived: drawing it takes time, which is no delay of the link. */
   #seen = null;
-  #seenAt = 0;
+  #arrivedAt = 0;
   /** Whether the station does not know yet that it was shown. */
   #unconfirmed = false;
 
@@ -92,10 +92,10 @@ export class Flow {
     if (this.#underWay.length === 0 && this.#unconfirmed) this.#confirm();
   }
 
-  /** The state `seq` is on the screen. */
-  shown(seq) {
+  /** The state `seq` is on the screen, and arrived at `arrivedAt`. */
+  shown(seq, arrivedAt = this.#now()) {
     this.#seen = seq;
-    this.#seenAt = this.#now();
+    this.#arrivedAt = arrivedAt;
     this.#unconfirmed = true;
     // During a drive the next setpoint confirms the state as well. After it, a long link would wait a
     // round trip for that; one that queues does wait.
@@ -152,7 +152,7 @@ export class Flow {
   }
 
   #held() {
-    return Math.round(this.#now() - this.#seenAt);
+    return Math.round(this.#now() - this.#arrivedAt);
   }
 }
 

@@ -269,12 +269,12 @@ export class Link extends EventTarget {
   #show(seq) {
     // A hidden page draws nothing, but still gets states: an alarm sounds there too.
     if (document.hidden) return this.#flow.received(seq);
-    const socket = this.#socket;
+    const [socket, arrivedAt] = [this.#socket, performance.now()];
     const drawn = (isShown) => {
       clearTimeout(timer);
       cancelAnimationFrame(frame);
       if (socket !== this.#socket) return;
-      isShown ? this.#flow.shown(seq) : this.#flow.received(seq);
+      isShown ? this.#flow.shown(seq, arrivedAt) : this.#flow.received(seq);
     };
     const timer = setTimeout(() => drawn(false), DRAWN);
     const frame = requestAnimationFrame(() => drawn(true));

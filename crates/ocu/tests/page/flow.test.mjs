@@ -33,6 +33,16 @@ test("on a short link one setpoint is under way, and the newest replaces what wa
   assert.deepEqual(it.taken(), []);
 });
 
+test("the time that drawing takes is the page's own", () => {
+  const it = rig();
+  it.now = 100;
+  it.flow.shown(12, 60);
+  assert.deepEqual(it.taken(), ["[12,40]"]);
+  it.now = 150;
+  it.flow.setpoint(push(0.5));
+  assert.deepEqual(it.taken(), ["[12,90,0.5,0]"]);
+});
+
 test("a release replaces a setpoint that waits, and is sent at once", () => {
   const it = rig();
   it.flow.shown(1);
