@@ -50,9 +50,10 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// A query is sent at most this often before the next refresh …
-    const TRIES: u32 = 3;
-    /// … with this pause after the first try, twice as long after the second, and so on.
+    /// A query is sent at most this often before the next refresh: with one answer in two lost, one of 30
+    /// queries stays without an answer until then …
+    const TRIES: u32 = 5;
+    /// … with this pause after the first try, and each time twice as long.
     const RETRY: Duration = Duration::from_secs(1);
 
     pub(super) const fn new(most: usize) -> Self {
@@ -176,7 +177,7 @@ impl Questions {
         attempts.made += 1;
         attempts.next = now
             + if attempts.made < Self::TRIES {
-                Self::RETRY * attempts.made
+                Self::RETRY * (1 << (attempts.made - 1))
             } else {
                 rest
             };

@@ -516,7 +516,7 @@ fn a_stranger_that_says_nothing_about_itself_is_asked_a_few_times_and_not_for_ev
             .filter(|message| !message.destination.has_wildcard())
             .count();
     }
-    assert_eq!(asked, 3, "in 25 s");
+    assert_eq!(asked, 5, "in 25 s");
     assert!(
         world
             .stack(operator)

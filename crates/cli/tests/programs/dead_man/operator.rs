@@ -134,6 +134,8 @@ pub(crate) enum Stop {
 }
 
 const STICK: &str = "#stick";
+/// How often the operator presses it.
+const PRESSES: usize = 4;
 const DRIVE_BY_HAND: &str = "#by-hand";
 const IS_LIVE: &str = "document.body.dataset.link === 'live'";
 const DRIVE_VIEW: &str = "[data-show=drive]";
@@ -214,10 +216,16 @@ impl<'a> Operator<'a> {
         // The vehicle may still be ready from the time before.
         let begins = format!("{IS_READY} || !document.querySelector('{DRIVE_BY_HAND}').hidden");
         self.browser.wait(&begins);
-        if self.browser.value(IS_READY) != true {
+        // A request may get lost on a link that has just been mended: then the operator presses again.
+        for _ in 0..PRESSES {
+            if self.browser.value(IS_READY) == true {
+                break;
+            }
             self.browser.press(DRIVE_BY_HAND);
-            self.browser.wait(IS_READY);
+            let browser = &mut self.browser;
+            within(Duration::from_secs(10), || browser.value(IS_READY) == true);
         }
+        self.browser.wait(IS_READY);
         self.browser.press(DRIVE_VIEW);
         self.bed.display.input("mousemove 300 400");
     }
