@@ -122,7 +122,7 @@ impl StopReply {
     pub(super) fn ignored(self) {
         match self {
             Self::Taken(taken) => taken(Ok(false)),
-            Self::Confirmed(reply) => reply(Ok(())),
+            Self::Confirmed(reply) => reply(Err("this press was cleared since".to_owned())),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Presses of the emergency stop. A page repeats a stop over several connections until it is confirmed,
-//! and a network delivers late what it has lost before: a copy may arrive after the same page has cleared
-//! the stop. It must not stop the vehicle again.
+//! and a network delivers late what it has lost before, on each connection for itself. So a copy of a stop
+//! may arrive after the same page has cleared it, and must not stop the vehicle again; and the request that
+//! clears a stop may arrive after the next press, and must not undo that. What pages do to each other's stops
+//! has no order: the last one to arrive counts.
 
 use std::collections::VecDeque;
 use std::str::FromStr;
@@ -24,33 +26,81 @@ impl FromStr for Press {
     }
 }
 
-/// The presses that their own pages have cleared.
+/// The page has pressed a stop since it asked to clear one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("stopped again since then: clear it again")]
+pub(super) struct PressedSince;
+
+/// What pages have pressed and cleared.
 #[derive(Debug, Default)]
-pub(super) struct ClearedPresses {
-    /// The last press of each page and target, by when it was cleared. The target `None` is all vehicles.
-    last: VecDeque<(Press, Option<u16>)>,
+pub(super) struct Presses {
+    /// By page and target, the latest last.
+    all: VecDeque<Entry>,
 }
 
-impl ClearedPresses {
-    /// More than pages clear within the time that a network delays.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    page: u32,
+    /// `None` for all vehicles.
+    vehicle: Option<u16>,
+    /// The last press that has arrived.
+    taken: u32,
+    /// The last press that was cleared, with those before it.
+    cleared: u32,
+}
+
+impl Presses {
+    /// More than pages press and clear within the time that a network delays.
     const MOST: usize = 64;
 
-    /// The page of this press clears what it has pressed so far for a vehicle, or for all.
-    pub(super) fn add(&mut self, last: Press, vehicle: Option<u16>) {
-        let is_same = |it: &(Press, Option<u16>)| (it.0.0, it.1) == (last.0, vehicle);
-        self.last.retain(|it| !is_same(it));
-        if self.last.len() >= Self::MOST {
-            self.last.pop_front();
+    /// Notes a press for a vehicle, or for all. Returns whether it counts: the page has not cleared it.
+    pub(super) fn take(&mut self, press: Press, vehicle: Option<u16>) -> bool {
+        let is_cleared = self.all.iter().any(|it| {
+            let is_meant = it.vehicle.is_none() || it.vehicle == vehicle;
+            it.page == press.0 && is_meant && press.1 <= it.cleared
+        });
+        if !is_cleared {
+            let entry = self.entry(press.0, vehicle);
+            entry.taken = entry.taken.max(press.1);
         }
-        self.last.push_back((last, vehicle));
+        !is_cleared
     }
 
-    /// Whether a press for a vehicle, or for all, was cleared.
-    pub(super) fn contains(&self, press: Press, vehicle: Option<u16>) -> bool {
-        self.last.iter().any(|&(last, cleared)| {
-            let is_meant = cleared.is_none() || cleared == vehicle;
-            is_meant && last.0 == press.0 && press.1 <= last.1
-        })
+    /// The page of this press clears what it has pressed until then for a vehicle, or for all.
+    ///
+    /// # Errors
+    /// If it has pressed another stop since, which concerns what is to be cleared.
+    pub(super) fn clear(&mut self, last: Press, vehicle: Option<u16>) -> Result<(), PressedSince> {
+        let is_pressed_since = self.all.iter().any(|it| {
+            let is_meant = vehicle.is_none() || it.vehicle.is_none() || it.vehicle == vehicle;
+            it.page == last.0 && is_meant && it.taken > last.1
+        });
+        if is_pressed_since {
+            return Err(PressedSince);
+        }
+        let entry = self.entry(last.0, vehicle);
+        entry.cleared = entry.cleared.max(last.1);
+        Ok(())
+    }
+
+    /// The entry of a page and a target, which is now the latest.
+    fn entry(&mut self, page: u32, vehicle: Option<u16>) -> &mut Entry {
+        let place = self
+            .all
+            .iter()
+            .position(|it| (it.page, it.vehicle) == (page, vehicle));
+        let known = place.and_then(|place| self.all.remove(place));
+        if self.all.len() >= Self::MOST {
+            self.all.pop_front();
+        }
+        self.all.push_back(known.unwrap_or(Entry {
+            page,
+            vehicle,
+            taken: 0,
+            cleared: 0,
+        }));
+        let last = self.all.len() - 1;
+        &mut self.all[last]
     }
 }
 
@@ -60,34 +110,62 @@ mod tests {
 
     #[test]
     fn a_press_is_cleared_with_those_before_it_and_none_after_it() {
-        let mut cleared = ClearedPresses::default();
-        cleared.add(Press(7, 3), Some(101));
-        assert!(cleared.contains(Press(7, 3), Some(101)));
-        assert!(cleared.contains(Press(7, 1), Some(101)));
-        assert!(!cleared.contains(Press(7, 4), Some(101)), "a new press");
-        assert!(!cleared.contains(Press(8, 1), Some(101)), "another page");
-        assert!(!cleared.contains(Press(7, 3), Some(102)), "another vehicle");
-        assert!(!cleared.contains(Press(7, 3), None), "all vehicles");
+        let mut presses = Presses::default();
+        assert!(presses.take(Press(7, 3), Some(101)));
+        assert!(presses.take(Press(7, 3), Some(101)), "a copy");
+        assert_eq!(presses.clear(Press(7, 3), Some(101)), Ok(()));
+        assert!(!presses.take(Press(7, 3), Some(101)), "a late copy");
+        assert!(!presses.take(Press(7, 1), Some(101)));
+        assert!(presses.take(Press(7, 3), Some(102)), "another vehicle");
+        assert!(presses.take(Press(7, 3), None), "all vehicles");
+        assert!(presses.take(Press(8, 1), Some(101)), "another page");
+        assert!(presses.take(Press(7, 4), Some(101)), "a new press");
     }
 
     #[test]
     fn clearing_all_clears_the_presses_for_each() {
-        let mut cleared = ClearedPresses::default();
-        cleared.add(Press(7, 3), None);
-        assert!(cleared.contains(Press(7, 3), None));
-        assert!(cleared.contains(Press(7, 2), Some(101)));
-        assert!(!cleared.contains(Press(7, 4), None));
+        let mut presses = Presses::default();
+        assert_eq!(presses.clear(Press(7, 3), None), Ok(()));
+        assert!(!presses.take(Press(7, 3), None));
+        assert!(!presses.take(Press(7, 2), Some(101)));
+        assert!(presses.take(Press(7, 4), None));
     }
 
     #[test]
-    fn what_many_pages_clear_is_bounded() {
-        let mut cleared = ClearedPresses::default();
-        for page in 0..1000 {
-            cleared.add(Press(page, 1), None);
-            cleared.add(Press(page, 2), None);
+    fn what_clears_an_earlier_press_does_not_undo_a_later_one() {
+        for (stopped, cleared, is_undone) in [
+            (Some(101), Some(101), false),
+            (Some(101), None, false),
+            (None, Some(101), false),
+            (None, None, false),
+            (Some(102), Some(101), true),
+        ] {
+            let mut presses = Presses::default();
+            assert!(presses.take(Press(7, 5), Some(101)));
+            assert!(presses.take(Press(7, 6), stopped));
+            let late = presses.clear(Press(7, 5), cleared);
+            assert_eq!(late.is_ok(), is_undone, "{stopped:?} {cleared:?}");
+            assert!(presses.take(Press(7, 6), stopped), "it goes on");
+            assert_eq!(presses.clear(Press(7, 6), cleared), Ok(()));
         }
-        assert_eq!(cleared.last.len(), ClearedPresses::MOST);
-        assert!(cleared.contains(Press(999, 2), None));
+        let mut presses = Presses::default();
+        assert!(presses.take(Press(7, 6), Some(101)));
+        assert_eq!(
+            presses.clear(Press(8, 1), Some(101)),
+            Ok(()),
+            "another page"
+        );
+    }
+
+    #[test]
+    fn what_many_pages_press_is_bounded() {
+        let mut presses = Presses::default();
+        for page in 0..1000 {
+            assert!(presses.take(Press(page, 1), None));
+            assert_eq!(presses.clear(Press(page, 1), None), Ok(()));
+        }
+        assert_eq!(presses.all.len(), Presses::MOST);
+        assert!(!presses.take(Press(999, 1), None));
     }
 
     #[test]

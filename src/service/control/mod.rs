@@ -47,7 +47,7 @@ mod tests;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use super::order::{REACH, number_of};
+use super::order::number_of;
 use super::{Handled, Outbox, Standing, State, code_of, read};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
@@ -276,10 +276,13 @@ impl Control {
         }
     }
 
+    /// Whether the client has requested control just after this message.
     fn was_requested_after(&self, message: &Received) -> bool {
+        /// A node sends few messages between the introduction of a client and its request.
+        const NEXT: u16 = 64;
         let numbers = self.requested.zip(number_of(message));
         numbers
-            .is_some_and(|(requested, number)| (1..REACH).contains(&requested.wrapping_sub(number)))
+            .is_some_and(|(requested, number)| (1..NEXT).contains(&requested.wrapping_sub(number)))
     }
 
     pub(super) fn is_controller(&self, client: JausId) -> bool {

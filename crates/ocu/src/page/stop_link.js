@@ -101,7 +101,8 @@ export class StopLink extends EventTarget {
   }
 
   #repeat() {
-    const sent = this.#channels.map((channel) => channel.send(this.#frames));
+    const isNew = this.#repeats === 0;
+    const sent = this.#channels.map((channel) => channel.send(this.#frames, isNew));
     // The other connection comes second: it may be busy, and this one is enough on a good network.
     if (!sent.includes(true) || this.#repeats > 0) {
       for (const { request } of this.#stops.values()) this.#link.send(request);
@@ -143,10 +144,10 @@ class Channel {
     return this.#socket?.readyState === 1;
   }
 
-  /** Sends frames unless earlier ones have not left the browser; false if they cannot be sent. */
-  send(frames) {
+  /** Sends frames; copies only if earlier ones have left the browser. False if they cannot be sent. */
+  send(frames, isNew = true) {
     if (!this.open) return false;
-    if (this.#socket.bufferedAmount === 0) frames.forEach((frame) => this.#socket.send(frame));
+    if (isNew || this.#socket.bufferedAmount === 0) frames.forEach((frame) => this.#socket.send(frame));
     return true;
   }
 

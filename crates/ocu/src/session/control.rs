@@ -36,6 +36,10 @@ impl Session {
                 OperatorRequest::Emergency { on: false }
                 | OperatorRequest::EmergencyAll { on: false }
                 | OperatorRequest::ClearAnyEmergency => {
+                    if self.pages.operator(page).is_none() {
+                        // Its operator may have stopped the vehicle again over a newer connection.
+                        return reply(Err("the page has connected anew".to_owned()));
+                    }
                     let vehicle = vehicle.or(self.pages.vehicle(page));
                     self.clear(now, (vehicle, press), request, &self.user(page), reply);
                 }

@@ -28,7 +28,8 @@ impl Session {
             StopTarget::Vehicle(number) => (false, Some(number)),
             StopTarget::All => (true, None),
         };
-        if (all || number.is_some()) && press.is_some_and(|it| self.cleared.contains(it, number)) {
+        let is_meant = all || number.is_some();
+        if is_meant && press.is_some_and(|it| !self.presses.take(it, number)) {
             return reply.ignored();
         }
         if all {
@@ -73,8 +74,8 @@ impl Session {
         }
     }
 
-    /// Handles a request to clear emergencies of a vehicle or of all. Copies of the page's presses up to
-    /// `press` that are still on their way stop nothing any more.
+    /// Handles a request to clear emergencies of a vehicle or of all, when the page's last press was
+    /// `press`.
     pub(super) fn clear(
         &mut self,
         now: Instant,
@@ -85,8 +86,10 @@ impl Session {
     ) {
         let is_of_all = matches!(request, OperatorRequest::EmergencyAll { .. });
         let target = vehicle.filter(|_| !is_of_all);
-        if let Some(press) = press.filter(|_| is_of_all || target.is_some()) {
-            self.cleared.add(press, target);
+        if let Some(press) = press.filter(|_| is_of_all || target.is_some())
+            && let Err(pressed) = self.presses.clear(press, target)
+        {
+            return reply(Err(pressed.to_string()));
         }
         if is_of_all {
             self.note_emergency_of_all(now, user, false);

@@ -29,7 +29,7 @@ use super::following::Sighting;
 use super::handover::{self, Notice};
 use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, json};
 use super::pages::Pages;
-use super::press::ClearedPresses;
+use super::press::Presses;
 use super::state::{State, Tree};
 use jaus::component::{Component, Handlers, PeerClocks};
 use jaus::node::{now, time_of_day};
@@ -45,8 +45,8 @@ pub(super) struct Session {
     clocks: PeerClocks,
     /// Whether all vehicles are to be in emergency, also those that appear later.
     all_stopped: bool,
-    /// The presses of stops that were cleared.
-    cleared: ClearedPresses,
+    /// What pages have pressed to stop, and cleared.
+    presses: Presses,
     /// Stops come before everything else.
     stops: mpsc::Receiver<StopOrder>,
     events: EventLog,
@@ -90,7 +90,7 @@ impl Session {
             pages: Pages::default(),
             clocks: PeerClocks::default(),
             all_stopped: false,
-            cleared: ClearedPresses::default(),
+            presses: Presses::default(),
             stops,
             events: EventLog::default(),
             orders: inbox,

@@ -68,11 +68,12 @@ fn only_a_living_hand_moves_a_vehicle() {
 
 #[test]
 fn a_stop_that_is_pressed_in_trouble_arrives() {
-    check(
+    let totals = check(
         "a_stop_that_is_pressed_in_trouble_arrives",
         FRESH_SEEDS,
         trial::run_stopped,
     );
+    assert!(totals.emergencies > 0, "no stop was judged: {totals:?}");
 }
 
 #[test]
@@ -84,7 +85,7 @@ fn wrong_clocks_stop_no_hand_that_holds() {
     );
 }
 
-fn check(test: &str, usual: u64, run: impl Fn(u64) -> Outcome + Sync) {
+fn check(test: &str, usual: u64, run: impl Fn(u64) -> Outcome + Sync) -> Totals {
     let totals = Mutex::new(Totals::default());
     let kept = include_str!("failed_seeds.txt");
     seeds::for_kept_and_fresh_seeds(test, kept, usual, |seed| {
@@ -98,6 +99,7 @@ fn check(test: &str, usual: u64, run: impl Fn(u64) -> Outcome + Sync) {
     let totals = totals.into_inner().unwrap();
     seeds::announce(&format!("{test}: {totals:.3?}"));
     assert!(totals.moved > 0, "nothing moved: {totals:?}");
+    totals
 }
 
 /// What was seen in all trials.

@@ -63,27 +63,50 @@ async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
     let scene = Scene::new().await;
     let mut socket = stops(&scene).await;
     let mut page = scene.driver().await;
-    for (stop, clear, answer) in [
-        ("stop 101", "emergency", "ok 101"),
-        ("stop-all", "emergency_all", "ok all"),
+    for (stop, clear, answer, first) in [
+        ("stop 101", "emergency", "ok 101", 1),
+        ("stop-all", "emergency_all", "ok all", 3),
     ] {
         let pressed = |press: u32| format!("{stop} 7.{press}");
-        assert_eq!(say(&mut socket, &pressed(1)).await, answer);
+        assert_eq!(say(&mut socket, &pressed(first)).await, answer);
         scene.until(emergency).await;
-        page.ask(json!({"type": clear, "on": false, "press": [7, 1]}))
+        page.ask(json!({"type": clear, "on": false, "press": [7, first]}))
             .await
             .unwrap();
         scene.until(|scene| !emergency(scene)).await;
-        assert_eq!(say(&mut socket, &pressed(1)).await, answer, "a late copy");
+        let late = say(&mut socket, &pressed(first)).await;
+        assert_eq!(late, answer, "a late copy");
         page.ask(json!({"type": "standby"})).await.unwrap();
         assert!(!emergency(&scene), "{stop}");
-        for new in [&pressed(2), stop] {
+        for new in [&pressed(first + 1), stop] {
             assert_eq!(say(&mut socket, new).await, answer, "a new one");
             scene.until(emergency).await;
             page.ask(json!({"type": clear, "on": false})).await.unwrap();
             scene.until(|scene| !emergency(scene)).await;
         }
     }
+}
+
+#[tokio::test]
+async fn a_late_request_to_clear_does_not_undo_a_later_stop() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    let mut page = scene.driver().await;
+    assert_eq!(say(&mut socket, "stop 101 7.5").await, "ok 101");
+    assert_eq!(say(&mut socket, "stop 101 7.6").await, "ok 101");
+    scene.until(emergency).await;
+    for clear in ["emergency", "emergency_all"] {
+        let late = page.ask(json!({"type": clear, "on": false, "press": [7, 5]}));
+        let refused = late.await.unwrap_err();
+        assert!(refused.contains("stopped again"), "{refused}");
+        // By the next answer, the vehicle would have cleared it.
+        let _ = page.ask(json!({"type": "standby"})).await;
+        assert!(emergency(&scene));
+    }
+    page.ask(json!({"type": "emergency", "on": false, "press": [7, 6]}))
+        .await
+        .unwrap();
+    scene.until(|scene| !emergency(scene)).await;
 }
 
 #[tokio::test]

@@ -12,6 +12,8 @@ use super::{all_are_met, on_a_bed};
 
 /// How often the operator stops the vehicle at once over each lossy link.
 const STOPS: usize = 200;
+/// The latest that one stop in 100 acts.
+const LATEST: Duration = Duration::from_secs(5);
 /// How long the link has lost packets before: after some time it has ended most drives.
 const LOSING: [Duration; 2] = [Duration::from_millis(300), Duration::from_secs(1)];
 /// How long something is held before the operator stops the vehicle at once.
@@ -209,11 +211,16 @@ fn repeated_stops(
         &seconds(link.emergency_limit()),
     ]);
     for (rank, cell) in all.iter_mut().enumerate() {
-        // The limit of the rest is that the motion ends.
-        let is_limited = rank < STOPS * 99 / 100;
-        let is_late = cell.emergency.is_none_or(|it| it > link.repeated_limit());
-        cell.emergency = (is_limited && is_late).then_some(Duration::MAX);
+        let is_counted = rank < STOPS * 99 / 100;
+        let limit = if is_counted {
+            link.repeated_limit()
+        } else {
+            LATEST
+        };
+        let is_late = cell.emergency.is_none_or(|it| it > limit);
+        cell.emergency = is_late.then_some(Duration::MAX);
     }
+    assert!(!driven.is_empty(), "no stop came while something drove");
     cells.extend(all);
 }
 

@@ -22,6 +22,7 @@ static BROWSERS: AtomicU32 = AtomicU32::new(0);
 const LIMIT: Duration = Duration::from_secs(60);
 /// Polling interval of a condition.
 const PERIOD: Duration = Duration::from_millis(50);
+const SECOND: Duration = Duration::from_secs(1);
 /// How long something may lie over a button.
 const COVERED: Duration = Duration::from_secs(6);
 /// Delay of a held key's first repeat, and of each further one.
@@ -399,7 +400,10 @@ impl Browser {
         // What the state shows and hides beside a button moves it, and a notice may lie over it for a while: a hand waits
         // until it rests and is free.
         let mut middle = self.value(&measure);
-        let deadline = Instant::now() + COVERED;
+        // Nothing may lie over a stop.
+        let is_stop = selector.starts_with("#estop");
+        let patience = if is_stop { SECOND } else { COVERED };
+        let deadline = Instant::now() + patience;
         while Instant::now() < deadline {
             std::thread::sleep(PERIOD);
             let before = std::mem::replace(&mut middle, self.value(&measure));
