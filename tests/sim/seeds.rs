@@ -42,6 +42,9 @@ pub(crate) fn for_kept_and_fresh_seeds(
         Some(seed) => seed..seed + 1,
         None => first..first + number_in("JAUS_SEEDS").unwrap_or(usual),
     };
+    if seeds.is_empty() {
+        return true;
+    }
     announce(&format!(
         "{test}: seeds {} to {}",
         seeds.start,

@@ -332,6 +332,9 @@ pub struct Control {
     pub held: bool,
     /// Whether control is wanted.
     pub wanted: bool,
+    /// Whether this station has resumed the vehicle, and keeps it ready. The vehicle may be ready
+    /// without that, as another client has left it.
+    pub resumed: bool,
     /// Name of the user who has the vehicle, or had it last. `null` unless this station has or wants
     /// control.
     pub user: Option<String>,

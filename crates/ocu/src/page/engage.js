@@ -8,6 +8,12 @@ import { part } from "./status.js";
 /** How long the station may take to show the effect of a request, in milliseconds. */
 const GRACE = 2_000;
 
+/** Whether the vehicle waits for Resume from this station. */
+export function awaitsResume(state) {
+  const mode = part(state, "primitive_driver")?.state;
+  return mode === "standby" || (mode === "ready" && state?.control?.resumed === false);
+}
+
 export class Engage {
   #ask;
   #mission;
@@ -37,7 +43,8 @@ export class Engage {
   update(state, operable, obstacle) {
     const { held, wanted, asking } = state?.control ?? {};
     const driver = part(state, "primitive_driver");
-    const mode = driver?.state;
+    // As another client has left it, the vehicle may be ready before it is resumed for this station.
+    const mode = awaitsResume(state) ? "standby" : driver?.state;
     this.#shown = state?.vehicle?.subsystem ?? null;
     if (this.#asked !== null && this.#shown !== this.#vehicle) this.#end("");
     if (this.#asked !== null && this.#isTakingOver) this.#stopMission(operable, obstacle);

@@ -5,7 +5,7 @@ import { Account } from "./account.js";
 import { get, mark, number, plain, say, show, toast, typing } from "./dom.js";
 import { Drive } from "./drive.js";
 import { Emergency } from "./emergency.js";
-import { Engage } from "./engage.js";
+import { Engage, awaitsResume } from "./engage.js";
 import { Events } from "./events.js";
 import { Fleet } from "./fleet.js";
 import { keepFocus } from "./focus.js";
@@ -128,7 +128,7 @@ function uncontrolled() {
   if (!state.control?.wanted) return mission.drives ? "A mission drives: take control first" : "Press Drive by hand first";
   if (mission.drives) return "A mission drives: press Take over first";
   const driver = part(state, "primitive_driver");
-  if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Drive by hand first";
+  if (state.control.held && driver?.ours && awaitsResume(state)) return "In standby: press Drive by hand first";
   return state.control.held ? "" : sentence(state.control.reason) || "Taking control";
 }
 

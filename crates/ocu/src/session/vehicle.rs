@@ -202,6 +202,7 @@ impl Vehicle {
         state::Control {
             user: user.map(ToString::to_string),
             page: owner.map(|it| it.page.0),
+            resumed: self.lease.is_ready(),
             planner_drives: self.is_driven_by_planner(),
             asking: self.handover.holder().map(|it| it.to_string()),
             requests: self.handover.requests(),

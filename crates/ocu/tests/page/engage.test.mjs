@@ -43,6 +43,21 @@ test("a packet that comes late does not take back the operator's word", async ()
   assert.ok(isReady());
 });
 
+test("a vehicle that is ready as another client has left it is resumed for this station", async () => {
+  const { engage, asked, isReady } = pressed();
+  await null;
+  const left = { control: { held: true, wanted: true, resumed: false }, vehicle: vehicle("ready") };
+  engage.update(left, true, "");
+  await null;
+  assert.deepEqual(asked, ["control", "resume"]);
+  assert.ok(!isReady());
+  assert.ok(!get("by-hand").hidden);
+  engage.update({ ...left, control: { ...left.control, resumed: true } }, true, "");
+  assert.ok(isReady());
+  engage.update(left, true, "");
+  assert.ok(!get("by-hand").hidden, "it says what to press");
+});
+
 test("a connection that stays lost ends it: the vehicle does not become ready when it comes back", async () => {
   const { engage, asked, isReady } = pressed();
   await null;
