@@ -35,11 +35,12 @@ pub(super) struct PressedSince;
 #[derive(Debug, Default)]
 pub(super) struct Presses {
     /// By page and target, the latest last.
-    all: VecDeque<Entry>,
+    all: VecDeque<Pressed>,
 }
 
+/// What a page has pressed for one target.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct Pressed {
     page: u32,
     /// `None` for all vehicles.
     vehicle: Option<u16>,
@@ -84,7 +85,7 @@ impl Presses {
     }
 
     /// The entry of a page and a target, which is now the latest.
-    fn entry(&mut self, page: u32, vehicle: Option<u16>) -> &mut Entry {
+    fn entry(&mut self, page: u32, vehicle: Option<u16>) -> &mut Pressed {
         let place = self
             .all
             .iter()
@@ -93,7 +94,7 @@ impl Presses {
         if self.all.len() >= Self::MOST {
             self.all.pop_front();
         }
-        self.all.push_back(known.unwrap_or(Entry {
+        self.all.push_back(known.unwrap_or(Pressed {
             page,
             vehicle,
             taken: 0,

@@ -130,7 +130,7 @@ export class Flow {
 
   /** Whether one more setpoint under way would not have to wait. */
   #mayDrive() {
-    const useful = 1 + Math.floor((this.#idle?.roundTrip ?? this.#estimate) / PERIOD);
+    const useful = 1 + Math.floor(this.#idleRoundTrip / PERIOD);
     return this.#underWay.length < Math.min(useful, this.#most) && this.#now() >= this.#restsUntil;
   }
 
@@ -147,8 +147,12 @@ export class Flow {
 
   /** Whether the oldest frame under way should have been confirmed by now. */
   get #isOverdue() {
-    const idle = this.#idle?.roundTrip ?? this.#estimate;
-    return this.#now() - (this.#underWay[0] ?? this.#now()) > idle + DELAYED;
+    return this.#now() - (this.#underWay[0] ?? this.#now()) > this.#idleRoundTrip + DELAYED;
+  }
+
+  /** The round trip of the idle link, as far as it is known. */
+  get #idleRoundTrip() {
+    return this.#idle?.roundTrip ?? this.#estimate;
   }
 
   #held() {

@@ -1,10 +1,11 @@
 //! The WebSockets that carry nothing but stops, so that these wait for no other frame. The right to
 //! observe suffices.
 //!
-//! A page sends `stop SUBSYSTEM PRESS` or `stop-all PRESS`, and repeats it until the vehicles have confirmed
-//! the emergency. The [press](crate::press), which may be left out, tells copies from new stops. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle,
-//! or `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an
-//! empty frame every 10 s.
+//! A page sends `stop SUBSYSTEM PRESS` or `stop-all PRESS`, and repeats it until the vehicles have
+//! confirmed the emergency. The [press](crate::press), which may be left out, tells copies from new
+//! stops. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle, or
+//! `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an empty
+//! frame every 10 s.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -180,7 +181,7 @@ fn read(text: &str) -> Option<(Option<u16>, Option<Press>)> {
         "stop-all" => None,
         _ => return None,
     };
-    // A stop counts, whatever is wrong with the rest.
+    // With a press that cannot be read it is still a stop.
     let press = words.next().and_then(|it| it.parse().ok());
     Some((vehicle, press))
 }

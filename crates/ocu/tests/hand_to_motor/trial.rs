@@ -57,8 +57,8 @@ pub(crate) fn run_rough(seed: u64) -> Outcome {
     outcome(world)
 }
 
-/// A trial in which somebody stops a vehicle just as things go wrong, and nobody clears it: the stop arrives,
-/// and holds against every hand.
+/// A trial in which an operator presses stop at the moment when something fails. Nobody clears it: once all
+/// is well it must have acted, and no hand may move the vehicle.
 pub(crate) fn run_stopped(seed: u64) -> Outcome {
     let mut world = World::new(seed, [1.0; 5]);
     let mut operators = [0, 1].map(|page| Operator::new(page, Intent::Any));
@@ -92,8 +92,7 @@ pub(crate) fn run_stopped(seed: u64) -> Outcome {
     outcome(world)
 }
 
-/// A trial in which only the clocks are wrong. The links are short: over 200 ms each way, states arrive in
-/// clumps during a drive, and with clocks slewed by 8 % the picture gets too old for a setpoint.
+/// A trial in which only the clocks are wrong, over links of up to 300 ms each way.
 pub(crate) fn run_quiet(seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let rates = [(); 5].map(|()| random.choose(&[1.0, 1.08, 0.92]));

@@ -266,10 +266,10 @@ fn moving() -> (Rig, Arc<AtomicU32>) {
     (rig.drive(), commands)
 }
 
-/// Notes why it was stopped.
-struct Stopped(Arc<Mutex<Vec<StopCause>>>);
+/// Notes why it is stopped.
+struct Causes(Arc<Mutex<Vec<StopCause>>>);
 
-impl Service for Stopped {
+impl Service for Causes {
     fn offers(&self) -> Vec<ServiceId> {
         vec![list_manager::LATEST]
     }
@@ -286,7 +286,7 @@ impl Service for Stopped {
 #[test]
 fn what_moves_is_told_that_its_client_has_restarted() {
     let causes = Arc::new(Mutex::new(Vec::new()));
-    let service = Box::new(Stopped(Arc::clone(&causes)));
+    let service = Box::new(Causes(Arc::clone(&causes)));
     let rig = Rig::new(vec![service], |stack| stack.management(Management::new()));
     let mut rig = rig.drive();
     causes.lock().unwrap().clear();
