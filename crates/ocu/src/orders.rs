@@ -11,7 +11,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use super::answer::Said;
 use super::ownership::{Owner, PageId};
 use super::page_link::TooOld;
-use super::press::Press;
+use super::press::{KnownStops, Press};
 use super::request::OperatorRequest;
 use super::state::{Events, Overlay};
 use super::token::Token;
@@ -31,8 +31,8 @@ pub(super) enum Order {
         /// The vehicle that the page means; `None` for the one that it has selected.
         vehicle: Option<u16>,
         request: OperatorRequest,
-        /// With the clearing of a stop: the page's last press.
-        press: Option<Press>,
+        /// With the clearing of a stop: the stops that the operator knows of, if the page says so.
+        known: Option<KnownStops>,
         /// Whether the page's user may change vehicles, and not only observe them.
         may_drive: bool,
         reply: Reply,

@@ -1,8 +1,8 @@
 //! Presses of the emergency stop. A page repeats a stop over several connections until it is confirmed,
 //! and a network delivers late what it has lost before, on each connection for itself. So a copy of a stop
 //! may arrive after the same page has cleared it, and must not stop the vehicle again; and the request that
-//! clears a stop may arrive after the next press, and must not undo that. What pages do to each other's stops
-//! has no order: the last one to arrive counts.
+//! clears a stop may arrive after the next press, and must not undo that, whoever has pressed: it says which
+//! stops its operator knows of.
 
 use std::collections::VecDeque;
 use std::str::FromStr;
@@ -26,7 +26,16 @@ impl FromStr for Press {
     }
 }
 
-/// The page has pressed a stop since it asked to clear one.
+/// What the operator of a page knows who asks to clear stops.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct KnownStops {
+    /// The last press of that page.
+    pub(super) press: Press,
+    /// How many presses of all pages the station had taken, by the state that the page shows.
+    pub(super) count: u64,
+}
+
+/// Somebody has pressed a stop of which the operator who asks to clear it does not know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("stopped again since then: clear it again")]
 pub(super) struct PressedSince;
@@ -36,18 +45,23 @@ pub(super) struct PressedSince;
 pub(super) struct Presses {
     /// By page and target, the latest last.
     all: VecDeque<Pressed>,
+    /// How many have been taken.
+    count: u64,
 }
 
 /// What a page has pressed for one target.
 #[derive(Debug, Clone, Copy)]
 struct Pressed {
-    page: u32,
+    /// `None` for what does not say whose press it is.
+    page: Option<u32>,
     /// `None` for all vehicles.
     vehicle: Option<u16>,
     /// The last press that has arrived.
     taken: u32,
     /// The last press that was cleared, with those before it.
     cleared: u32,
+    /// How many presses the station had taken with the last one.
+    count: u64,
 }
 
 impl Presses {
@@ -55,37 +69,62 @@ impl Presses {
     const MOST: usize = 64;
 
     /// Notes a press for a vehicle, or for all. Returns whether it counts: the page has not cleared it.
-    pub(super) fn take(&mut self, press: Press, vehicle: Option<u16>) -> bool {
-        let is_cleared = self.all.iter().any(|it| {
-            let is_meant = it.vehicle.is_none() || it.vehicle == vehicle;
-            it.page == press.0 && is_meant && press.1 <= it.cleared
-        });
+    pub(super) fn take(&mut self, press: Option<Press>, vehicle: Option<u16>) -> bool {
+        let is_cleared = press.is_some_and(|press| self.is_cleared(press, vehicle));
         if !is_cleared {
-            let entry = self.entry(press.0, vehicle);
-            entry.taken = entry.taken.max(press.1);
+            let count = self.count + 1;
+            let entry = self.entry(press.map(|it| it.0), vehicle);
+            // What names no press may be a copy or not: it counts as a new one.
+            let number = press.map_or(entry.taken.saturating_add(1), |it| it.1);
+            if number > entry.taken {
+                entry.taken = number;
+                entry.count = count;
+                self.count = count;
+            }
         }
         !is_cleared
     }
 
-    /// The page of this press clears what it has pressed until then for a vehicle, or for all.
+    fn is_cleared(&self, press: Press, vehicle: Option<u16>) -> bool {
+        self.all.iter().any(|it| {
+            let is_meant = it.vehicle.is_none() || it.vehicle == vehicle;
+            it.page == Some(press.0) && is_meant && press.1 <= it.cleared
+        })
+    }
+
+    /// How many presses have been taken, without copies of them.
+    pub(super) const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// A page clears the presses that its operator knows of, for a vehicle or for all.
     ///
     /// # Errors
-    /// If it has pressed another stop since, which concerns what is to be cleared.
-    pub(super) fn clear(&mut self, last: Press, vehicle: Option<u16>) -> Result<(), PressedSince> {
+    /// If this page or another one has pressed a stop since, which concerns what is to be cleared.
+    pub(super) fn clear(
+        &mut self,
+        known: KnownStops,
+        vehicle: Option<u16>,
+    ) -> Result<(), PressedSince> {
+        let Press(page, last) = known.press;
         let is_pressed_since = self.all.iter().any(|it| {
             let is_meant = vehicle.is_none() || it.vehicle.is_none() || it.vehicle == vehicle;
-            it.page == last.0 && is_meant && it.taken > last.1
+            let is_known = match it.page == Some(page) {
+                true => it.taken <= last,
+                false => it.count <= known.count || it.taken <= it.cleared,
+            };
+            is_meant && !is_known
         });
         if is_pressed_since {
             return Err(PressedSince);
         }
-        let entry = self.entry(last.0, vehicle);
-        entry.cleared = entry.cleared.max(last.1);
+        let entry = self.entry(Some(page), vehicle);
+        entry.cleared = entry.cleared.max(last);
         Ok(())
     }
 
     /// The entry of a page and a target, which is now the latest.
-    fn entry(&mut self, page: u32, vehicle: Option<u16>) -> &mut Pressed {
+    fn entry(&mut self, page: Option<u32>, vehicle: Option<u16>) -> &mut Pressed {
         let place = self
             .all
             .iter()
@@ -99,6 +138,7 @@ impl Presses {
             vehicle,
             taken: 0,
             cleared: 0,
+            count: 0,
         }));
         let last = self.all.len() - 1;
         &mut self.all[last]
@@ -109,27 +149,34 @@ impl Presses {
 mod tests {
     use super::*;
 
+    fn known(press: Press) -> KnownStops {
+        KnownStops { press, count: 0 }
+    }
+
     #[test]
     fn a_press_is_cleared_with_those_before_it_and_none_after_it() {
         let mut presses = Presses::default();
-        assert!(presses.take(Press(7, 3), Some(101)));
-        assert!(presses.take(Press(7, 3), Some(101)), "a copy");
-        assert_eq!(presses.clear(Press(7, 3), Some(101)), Ok(()));
-        assert!(!presses.take(Press(7, 3), Some(101)), "a late copy");
-        assert!(!presses.take(Press(7, 1), Some(101)));
-        assert!(presses.take(Press(7, 3), Some(102)), "another vehicle");
-        assert!(presses.take(Press(7, 3), None), "all vehicles");
-        assert!(presses.take(Press(8, 1), Some(101)), "another page");
-        assert!(presses.take(Press(7, 4), Some(101)), "a new press");
+        assert!(presses.take(Some(Press(7, 3)), Some(101)));
+        assert!(presses.take(Some(Press(7, 3)), Some(101)), "a copy");
+        assert_eq!(presses.clear(known(Press(7, 3)), Some(101)), Ok(()));
+        assert!(!presses.take(Some(Press(7, 3)), Some(101)), "a late copy");
+        assert!(!presses.take(Some(Press(7, 1)), Some(101)));
+        assert!(
+            presses.take(Some(Press(7, 3)), Some(102)),
+            "another vehicle"
+        );
+        assert!(presses.take(Some(Press(7, 3)), None), "all vehicles");
+        assert!(presses.take(Some(Press(8, 1)), Some(101)), "another page");
+        assert!(presses.take(Some(Press(7, 4)), Some(101)), "a new press");
     }
 
     #[test]
     fn clearing_all_clears_the_presses_for_each() {
         let mut presses = Presses::default();
-        assert_eq!(presses.clear(Press(7, 3), None), Ok(()));
-        assert!(!presses.take(Press(7, 3), None));
-        assert!(!presses.take(Press(7, 2), Some(101)));
-        assert!(presses.take(Press(7, 4), None));
+        assert_eq!(presses.clear(known(Press(7, 3)), None), Ok(()));
+        assert!(!presses.take(Some(Press(7, 3)), None));
+        assert!(!presses.take(Some(Press(7, 2)), Some(101)));
+        assert!(presses.take(Some(Press(7, 4)), None));
     }
 
     #[test]
@@ -142,31 +189,61 @@ mod tests {
             (Some(102), Some(101), true),
         ] {
             let mut presses = Presses::default();
-            assert!(presses.take(Press(7, 5), Some(101)));
-            assert!(presses.take(Press(7, 6), stopped));
-            let late = presses.clear(Press(7, 5), cleared);
+            assert!(presses.take(Some(Press(7, 5)), Some(101)));
+            assert!(presses.take(Some(Press(7, 6)), stopped));
+            let late = presses.clear(known(Press(7, 5)), cleared);
             assert_eq!(late.is_ok(), is_undone, "{stopped:?} {cleared:?}");
-            assert!(presses.take(Press(7, 6), stopped), "it goes on");
-            assert_eq!(presses.clear(Press(7, 6), cleared), Ok(()));
+            assert!(presses.take(Some(Press(7, 6)), stopped), "it goes on");
+            assert_eq!(presses.clear(known(Press(7, 6)), cleared), Ok(()));
         }
+    }
+
+    #[test]
+    fn a_press_of_another_page_is_cleared_by_who_knows_of_it() {
+        for (press, stopped, cleared, is_undone) in [
+            (Some(Press(7, 6)), Some(101), Some(101), false),
+            (Some(Press(7, 6)), None, Some(101), false),
+            (Some(Press(7, 6)), Some(101), None, false),
+            (None, Some(101), Some(101), false),
+            (Some(Press(7, 6)), Some(102), Some(101), true),
+        ] {
+            let mut presses = Presses::default();
+            assert!(presses.take(Some(Press(9, 1)), Some(101)));
+            let knows = |count| KnownStops {
+                press: Press(8, 1),
+                count,
+            };
+            let before = presses.count();
+            assert!(presses.take(press, stopped));
+            let late = presses.clear(knows(before), cleared);
+            assert_eq!(late.is_ok(), is_undone, "{press:?} {stopped:?} {cleared:?}");
+            let now = presses.count();
+            assert!(
+                presses.take(press, stopped),
+                "a copy, unless it names no press"
+            );
+            assert_eq!(presses.count() == now, press.is_some());
+            assert_eq!(presses.clear(knows(presses.count()), cleared), Ok(()));
+        }
+    }
+
+    #[test]
+    fn what_its_own_page_has_cleared_needs_no_other_page_that_knows_of_it() {
         let mut presses = Presses::default();
-        assert!(presses.take(Press(7, 6), Some(101)));
-        assert_eq!(
-            presses.clear(Press(8, 1), Some(101)),
-            Ok(()),
-            "another page"
-        );
+        assert!(presses.take(Some(Press(7, 6)), Some(101)));
+        assert_eq!(presses.clear(known(Press(7, 6)), Some(101)), Ok(()));
+        assert_eq!(presses.clear(known(Press(8, 0)), Some(101)), Ok(()));
     }
 
     #[test]
     fn what_many_pages_press_is_bounded() {
         let mut presses = Presses::default();
         for page in 0..1000 {
-            assert!(presses.take(Press(page, 1), None));
-            assert_eq!(presses.clear(Press(page, 1), None), Ok(()));
+            assert!(presses.take(Some(Press(page, 1)), None));
+            assert_eq!(presses.clear(known(Press(page, 1)), None), Ok(()));
         }
         assert_eq!(presses.all.len(), Presses::MOST);
-        assert!(!presses.take(Press(999, 1), None));
+        assert!(!presses.take(Some(Press(999, 1)), None));
     }
 
     #[test]

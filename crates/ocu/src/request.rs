@@ -21,6 +21,9 @@ pub struct Frame {
     /// nothing any more.
     #[serde(default)]
     pub press: Option<Press>,
+    /// Of the clearing of a stop: how many stops the station had taken, by the state that the page shows.
+    #[serde(default)]
+    pub stops: u64,
     /// The content.
     #[serde(flatten)]
     pub said: Said,
@@ -189,6 +192,7 @@ impl Frame {
             id: None,
             vehicle: None,
             press: None,
+            stops: 0,
             said,
         })
     }
@@ -357,6 +361,7 @@ mod tests {
                     id: None,
                     vehicle: None,
                     press: None,
+                    stops: 0,
                     said: Said::OperatorRequest(request)
                 },
                 "{text}"

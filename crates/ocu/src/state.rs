@@ -26,6 +26,8 @@ pub struct State {
     pub map: Option<Map>,
     /// Number of the latest event in the log of the station.
     pub events: u64,
+    /// How many stops of all pages the station has taken, without copies of them.
+    pub stops: u64,
 }
 
 /// The list of vehicles.

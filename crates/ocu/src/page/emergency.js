@@ -3,7 +3,7 @@
 // emergency, over reconnections and other vehicles as well; that it has stopped shows in its speed.
 // Clearing it takes two.
 
-import { get, mark, say, show, toast } from "./dom.js";
+import { get, mark, number, say, show, toast } from "./dom.js";
 import { StopLink } from "./stop_link.js";
 import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
@@ -22,6 +22,8 @@ export class Emergency {
   #refusal = "";
   /** How many requests to clear are not answered: what the station says meanwhile may be over with them. */
   #clearings = 0;
+  /** How many stops of all pages the station had taken by the state that is shown: those the operator knows of. */
+  #known = 0;
   #vehicles = [];
   /** Whether the station stops vehicles that join. */
   #latched = false;
@@ -38,7 +40,11 @@ export class Emergency {
     this.#link = link;
     this.#stops = new StopLink(link);
     this.#stops.addEventListener("refused", ({ detail }) => this.#refuse(detail));
-    link.addEventListener("hello", () => this.#stops.start());
+    link.addEventListener("hello", () => {
+      // Another station may count from the start.
+      this.#known = 0;
+      this.#stops.start();
+    });
     link.addEventListener("barred", () => this.#stops.close());
     this.#unbar = unbar;
     get("estop").addEventListener("click", () => this.stop());
@@ -78,7 +84,8 @@ export class Emergency {
   }
 
   /** Takes a state that has just arrived. What it says was said after the stops, but for what was under way. */
-  handleState({ vehicle }) {
+  handleState({ vehicle, stops }) {
+    this.#known = number(stops) ?? 0;
     if (vehicle) this.#confirm(vehicle, vehicle.emergency === true);
   }
 
@@ -182,7 +189,7 @@ export class Emergency {
     if (request.type === "emergency_all") this.#stops.cancelAll();
     else this.#stops.cancel(this.#link.vehicle);
     this.#clearings += 1;
-    const reason = await this.#link.ask({ ...request, press: this.#stops.press });
+    const reason = await this.#link.ask({ ...request, press: this.#stops.press, stops: this.#known });
     this.#clearings -= 1;
     if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);

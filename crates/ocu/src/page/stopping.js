@@ -35,20 +35,22 @@ export function othersWords(may) {
   return may ? `${who}Clear it here only if you know why. ` : `${who}An administrator can clear it here. `;
 }
 
-/** The vehicles that are present, by how far their stop is. */
+/** The vehicles that are present or silent, by how far their stop is. */
 function sorted(vehicles) {
   const present = vehicles.filter(({ presence }) => presence === "present");
   const inEmergency = present.filter(({ state }) => state === "emergency");
+  // A silent one reports nothing: the station has to know of its stop.
+  const silent = vehicles.filter(({ presence, stop_set: isSet }) => presence === "silent" && isSet !== true);
   return {
     present: present.length,
-    pending: present.length - inEmergency.length,
+    pending: present.length - inEmergency.length + silent.length,
     runaways: inEmergency.filter(({ runaway }) => runaway === true).length,
     moving: inEmergency.filter(({ at_rest: rest }) => rest === false).length,
     unknown: inEmergency.filter(({ at_rest: rest }) => rest !== true && rest !== false).length,
   };
 }
 
-/** How many of the vehicles that are present have not reported their emergency. */
+/** How many vehicles have not reported their emergency, or are silent and not even stopped by the station. */
 export const pendingStops = (vehicles) => sorted(vehicles).pending;
 
 /** What *Stop all* has reached, in words. `wanted` says whether it is still being sent. */

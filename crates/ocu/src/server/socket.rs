@@ -23,7 +23,7 @@ use crate::orders::{
 };
 use crate::ownership::{Owner, PageId};
 use crate::page_link::{PageLink, Seen, TooOld};
-use crate::press::Press;
+use crate::press::{KnownStops, Press};
 use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
 use crate::token::Token;
 use crate::users::UserRole;
@@ -254,8 +254,8 @@ impl Reader<'_> {
                 seen,
             }) => self.drive(frame.id, (forward, turn), seen).await,
             Said::OperatorRequest(request) => {
-                let meant = (frame.vehicle, frame.press);
-                self.request(frame.id, meant, request).await;
+                let known = (frame.press, frame.stops);
+                self.request(frame.id, frame.vehicle, request, known).await;
             }
         }
         None
@@ -357,8 +357,9 @@ impl Reader<'_> {
     async fn request(
         &mut self,
         id: Option<u64>,
-        (vehicle, press): (Option<u16>, Option<Press>),
+        vehicle: Option<u16>,
         request: OperatorRequest,
+        (press, count): (Option<Press>, u64),
     ) {
         let reply = self.recorded(id, vehicle, request);
         let may_drive = self.visitor.may(UserRole::Drive);
@@ -388,7 +389,7 @@ impl Reader<'_> {
                 page: self.page,
                 vehicle,
                 request,
-                press,
+                known: press.map(|press| KnownStops { press, count }),
                 may_drive,
                 reply,
             };

@@ -26,7 +26,7 @@ impl Session {
                 page,
                 vehicle,
                 request,
-                press,
+                known,
                 may_drive,
                 reply,
             } => match request {
@@ -41,7 +41,7 @@ impl Session {
                         return reply(Err("the page has connected anew".to_owned()));
                     }
                     let vehicle = vehicle.or(self.pages.vehicle(page));
-                    self.clear(now, (vehicle, press), request, &self.user(page), reply);
+                    self.clear(now, (vehicle, known), request, &self.user(page), reply);
                 }
                 OperatorRequest::Handover {
                     part,

@@ -11,7 +11,7 @@ use super::client::{Cleared, Client, Finished};
 use super::control::{NO_VEHICLE, in_words};
 use super::vehicle::Vehicle;
 use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
-use crate::press::Press;
+use crate::press::KnownStops;
 use crate::request::OperatorRequest;
 
 impl Session {
@@ -29,7 +29,7 @@ impl Session {
             StopTarget::All => (true, None),
         };
         let is_meant = all || number.is_some();
-        if is_meant && press.is_some_and(|it| !self.presses.take(it, number)) {
+        if is_meant && !self.presses.take(press, number) {
             return reply.ignored();
         }
         if all {
@@ -74,20 +74,20 @@ impl Session {
         }
     }
 
-    /// Handles a request to clear emergencies of a vehicle or of all, when the page's last press was
-    /// `press`.
+    /// Handles a request to clear emergencies of a vehicle or of all, by an operator who knows of the stops
+    /// `known`.
     pub(super) fn clear(
         &mut self,
         now: Instant,
-        (vehicle, press): (Option<u16>, Option<Press>),
+        (vehicle, known): (Option<u16>, Option<KnownStops>),
         request: OperatorRequest,
         user: &Arc<str>,
         reply: Reply,
     ) {
         let is_of_all = matches!(request, OperatorRequest::EmergencyAll { .. });
         let target = vehicle.filter(|_| !is_of_all);
-        if let Some(press) = press.filter(|_| is_of_all || target.is_some())
-            && let Err(pressed) = self.presses.clear(press, target)
+        if let Some(known) = known.filter(|_| is_of_all || target.is_some())
+            && let Err(pressed) = self.presses.clear(known, target)
         {
             return reply(Err(pressed.to_string()));
         }

@@ -275,6 +275,7 @@ impl Session {
             mission: vehicle.and_then(|it| it.mission_state(now)),
             map: vehicle.and_then(|it| it.picture.map_state()),
             events: self.events.latest(),
+            stops: self.presses.count(),
         }
     }
 }

@@ -70,7 +70,7 @@ async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
         let pressed = |press: u32| format!("{stop} 7.{press}");
         assert_eq!(say(&mut socket, &pressed(first)).await, answer);
         scene.until(emergency).await;
-        page.ask(json!({"type": clear, "on": false, "press": [7, first]}))
+        page.ask(json!({"type": clear, "on": false, "press": [7, first], "stops": 99}))
             .await
             .unwrap();
         scene.until(|scene| !emergency(scene)).await;
@@ -107,6 +107,34 @@ async fn a_late_request_to_clear_does_not_undo_a_later_stop() {
         .await
         .unwrap();
     scene.until(|scene| !emergency(scene)).await;
+}
+
+#[tokio::test]
+async fn who_clears_a_stop_of_another_page_has_seen_it() {
+    let scene = Scene::new().await;
+    let mut socket = stops(&scene).await;
+    let mut page = scene.driver().await;
+    assert_eq!(page.state().await["stops"], 0);
+    for (stop, answer) in [
+        ("stop 101 7.5", "ok 101"),
+        ("stop 101", "ok 101"),
+        ("stop-all", "ok all"),
+    ] {
+        let before = page.state().await["stops"].as_u64().unwrap();
+        assert_eq!(say(&mut socket, stop).await, answer);
+        scene.until(emergency).await;
+        for clear in ["emergency", "emergency_all"] {
+            let known = json!({"type": clear, "on": false, "press": [8, 0], "stops": before});
+            let refused = page.ask(known).await.unwrap_err();
+            assert!(refused.contains("stopped again"), "{refused}");
+        }
+        let shown = page.until(|it| it["stops"].as_u64() > Some(before)).await;
+        assert!(emergency(&scene));
+        let known =
+            json!({"type": "emergency_all", "on": false, "press": [8, 0], "stops": shown["stops"]});
+        page.ask(known).await.unwrap();
+        scene.until(|scene| !emergency(scene)).await;
+    }
 }
 
 #[tokio::test]

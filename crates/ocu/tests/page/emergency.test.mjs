@@ -39,26 +39,30 @@ function page({ vehicle = 101, barred = "" } = {}) {
   forgetElements();
   Socket.all = [];
   let answer;
-  const unbarred = [];
+  const [unbarred, asked] = [[], []];
   const link = Object.assign(new EventTarget(), {
     open: true,
     vehicle,
     send() {},
-    ask: () => new Promise((resolve) => (answer = resolve)),
+    ask: (request) => {
+      asked.push(request);
+      return new Promise((resolve) => (answer = resolve));
+    },
   });
   const emergency = new Emergency(link, () => unbarred.push(1));
   link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
-  const state = (changes) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes } });
+  const state = (changes, stops) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes }, stops });
   const update = (shown) => emergency.update(shown, true, { vehicles: [], allStopped: false }, barred, clears);
   update(null);
   return {
     link,
     emergency,
     unbarred,
+    asked,
     update: () => update(null),
     /** A state arrives. */
-    hear: (changes) => {
-      const detail = state(changes);
+    hear: (changes, stops = 0) => {
+      const detail = state(changes, stops);
       emergency.handleState(detail);
       update(detail);
     },
@@ -146,18 +150,35 @@ test("a stop that was pressed before the page knew a vehicle is sent when it doe
   assert.deepEqual(repeated(), ["stop 101"]);
 });
 
-test("a stop of all is confirmed by the latch, and not by vehicles that are silent or already stopped", () => {
+test("a stop of all is confirmed by the latch and the station's stop of each, and not by vehicles that are already stopped", () => {
   const { emergency, hearFleet, repeated } = page();
-  const known = [
+  const known = (isSet) => [
     { subsystem: 101, state: "emergency", presence: "present" },
-    { subsystem: 102, state: "ready", presence: "silent" },
+    { subsystem: 102, state: "ready", presence: "silent", stop_set: isSet },
+    { subsystem: 103, state: null, presence: "gone" },
   ];
   emergency.stopAll();
-  hearFleet(known);
+  hearFleet(known(true));
   hearFleet([]);
   assert.deepEqual(repeated(), ["stop-all"]);
-  hearFleet(known, true);
+  // Somebody has cleared the silent one since all were stopped the last time.
+  hearFleet(known(false), true);
+  assert.deepEqual(repeated(), ["stop-all"]);
+  hearFleet(known(true), true);
   assert.deepEqual(repeated(), []);
+});
+
+test("who clears a stop says which stops the shown state knows of, and none of another connection", async () => {
+  const { asked, emergency, hear, link, answer } = page();
+  hear({ emergency: true, stop_set: true }, 7);
+  get("clear-yes").click();
+  assert.deepEqual([asked[0].type, asked[0].stops], ["emergency", 7]);
+  await answer(null);
+  link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
+  // The old state is still shown.
+  emergency.update({ vehicle: { emergency: true }, stops: 7 }, true, { vehicles: [], allStopped: false }, "", clears);
+  get("clear-yes").click();
+  assert.equal(asked[1].stops, 0);
 });
 
 test("a key whose first press the page did not see stops by its repeats", () => {

@@ -44,9 +44,10 @@ test("the latch is cleared as it was set, by who may clear emergencies", () => {
     const { update, requests } = page();
     update(stopped, true);
     get(button).click();
-    const [{ press, ...request }] = requests;
+    const [{ press, stops, ...request }] = requests;
     assert.deepEqual(request, { type: "emergency_all", on: false }, button);
     assert.equal(press.length, 2, "by which the station knows late copies of its stops");
+    assert.equal(stops, 0, "by which it knows which stops the operator has seen");
   }
   page().update(stopped, true, true);
   assert.ok(!get("latch-clear").disabled);

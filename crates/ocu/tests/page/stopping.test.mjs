@@ -37,6 +37,7 @@ test("all are stopped only if each of them is measured at rest", () => {
   assert.equal(stopAllWords([one(), one({ state: "ready" })], false), "2 vehicles");
   assert.equal(stopAllWords([one(), one({ at_rest: false, runaway: true })], false), "1 RUNAWAY");
   assert.equal(stopAllWords([], false), "0 vehicles");
+  assert.equal(stopAllWords([one(), one({ presence: "silent", stop_set: false })], true), "1 not stopped yet");
   assert.equal(pendingStops([one(), one({ state: "ready" }), one({ state: "ready", presence: "gone" })]), 1);
 });
 
