@@ -255,13 +255,13 @@ impl Picture {
     }
 
     /// Handles the report of a mission. A planner that drove and has none any more has restarted:
-    /// its mission ended without a report, and is kept for that.
+    /// its mission ended without a report, and is kept for that. Nobody has approved what it drives since.
     fn handle_mission(&mut self, now: Instant, by: JausId, what: Mission) {
         if what.stage.is_idle() {
             self.handle_planner_restart(by);
-            if self.has_planner_restarted {
-                return;
-            }
+        }
+        if self.has_planner_restarted && (what.stage.is_idle() || what.stage.is_driven()) {
+            return;
         }
         (self.has_planner_restarted, self.was_planner_lost) = (false, false);
         self.mission = Some(Sample { what, by, at: now });

@@ -329,10 +329,17 @@ fn a_planner_whose_restart_its_session_has_noticed_is_lost_before_it_reports() {
     assert_eq!(picture.lost_planner(start), None, "it did not drive");
     picture.handle_report(start, PLANNER, mission(7).into());
     picture.handle_planner_restart(PLANNER);
+    let lost = Some((PLANNER, Absence::Restarted));
+    assert_eq!(picture.lost_planner(start), lost);
+    picture.handle_report(start, PLANNER, mission(7).into());
     assert_eq!(
         picture.lost_planner(start),
-        Some((PLANNER, Absence::Restarted))
+        lost,
+        "nobody has approved that"
     );
+    picture.handle_report(start, PLANNER, mission(3).into());
+    picture.handle_report(start, PLANNER, mission(7).into());
+    assert_eq!(picture.lost_planner(start), None, "a new mission");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::picture::Picture;
 use crate::role::Role;
 use crate::state;
 use jaus::address::JausId;
-use jaus::component::{Session, SessionError, SessionState, TargetState};
+use jaus::component::{Session, SessionError, SessionLoss, SessionState, TargetState};
 use jaus::service::State;
 
 /// The control lease: wanted and held parts.
@@ -89,10 +89,15 @@ impl Lease {
         self.holds.get(&part)?.held()
     }
 
-    /// Whether a part under control has restarted and is not yet under control again.
-    pub(super) fn has_restarted(&self, part: JausId) -> bool {
+    /// Whether a part has ended control by itself and is not yet under control again: it has restarted, or
+    /// begins anew for another reason.
+    pub(super) fn has_ended(&self, part: JausId) -> bool {
         let state = self.holds.get(&part).map(Hold::state);
-        matches!(state, Some(SessionState::Lost { why, .. }) if why.is_restart())
+        matches!(state, Some(SessionState::Lost { why, .. }) if match why {
+            SessionLoss::Dropped => true,
+            SessionLoss::State(_) => why.is_technical(),
+            _ => why.is_restart(),
+        })
     }
 
     /// The sessions with all held parts.

@@ -184,7 +184,7 @@ impl Vehicle {
     /// have no supervising client left, so the station takes control and sends them to standby.
     pub(super) fn stop_after_lost_planner(&mut self, now: Instant) {
         if let Some(planner) = self.picture.find(Role::Planner)
-            && self.lease.has_restarted(planner)
+            && self.lease.has_ended(planner)
         {
             self.picture.handle_planner_restart(planner);
         }

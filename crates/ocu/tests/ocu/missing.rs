@@ -203,6 +203,17 @@ async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_
 
 #[tokio::test]
 async fn a_planner_that_restarts_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    planner_restarts_with(0).await;
+}
+
+#[tokio::test]
+async fn a_planner_that_restarts_and_reports_at_once_that_it_drives_is_not_the_one_that_was_approved()
+ {
+    planner_restarts_with(7).await;
+}
+
+/// A planner restarts while it drives, and is in this stage then.
+async fn planner_restarts_with(new_stage: u8) {
     let scene = Scene::new().await;
     let stage = Arc::new(AtomicU8::new(3));
     let first = planner(&scene, Arc::clone(&stage));
@@ -210,7 +221,7 @@ async fn a_planner_that_restarts_while_it_drives_is_named_and_the_station_stops_
 
     drop(first);
     scene.until(|scene| scene.is_free(36)).await;
-    stage.store(0, Ordering::Relaxed);
+    stage.store(new_stage, Ordering::Relaxed);
     let _second = planner(&scene, Arc::clone(&stage));
     let stopped = |state: &Value| {
         state["mission"]["lost"]["told_to_stop"] == true && driver_of(state)["state"] == "standby"
