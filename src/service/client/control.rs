@@ -496,7 +496,15 @@ impl Control {
         out: &mut Outbox,
     ) -> Option<ControlNews> {
         match (self.state, code) {
-            (State::Held, 0) => self.lose_or_ask_again(now, peer, ControlLost::TakenBack, out),
+            (State::Held, 0) => {
+                let news = self.lose_or_ask_again(now, peer, ControlLost::TakenBack, out);
+                if news.is_some() {
+                    // Perhaps it ends an earlier control, and has come after the confirmation of this
+                    // one: then the peer would keep a client that believes to have lost it.
+                    self.send_release(now, peer, out);
+                }
+                news
+            }
             (State::Held, _) => self.lose(ControlLost::NotAvailable),
             (State::Releasing(_), _) => Some(ControlNews::Released),
             // The end of an earlier control.

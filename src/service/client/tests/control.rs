@@ -281,12 +281,26 @@ fn a_lost_reject_is_noticed_with_the_next_renewal() {
 fn control_that_comes_back_behind_the_applications_back_is_released() {
     let (mut bench, _) = held(5);
     bench.hear(PEER, &reject(0));
+    bench.sent.clear();
     bench.hear(PEER, &confirm(0));
     assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
     assert_eq!(
         news(&mut bench),
         [ControlNews::Lost(ControlLost::TakenBack)]
     );
+}
+
+#[test]
+fn a_rejection_that_came_after_a_later_confirmation_leaves_no_control_behind() {
+    let (mut bench, _) = held(0);
+    bench.hear(PEER, &reject(0));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::TakenBack)]
+    );
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<ReleaseControl>(), [], "once");
 }
 
 #[test]
