@@ -34,9 +34,10 @@ pub(super) trait Behaviour: Send {
         let _ = (controls, context);
     }
 
-    /// Handles the end of a client's control: what it has set for its own commands is void.
-    fn handle_control_end(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
-        let _ = (controls, context);
+    /// Handles the end of a client's control, which is a stop as well: what it has set for its own commands is
+    /// void.
+    fn handle_control_end(&mut self, controls: &mut Controls) {
+        let _ = controls;
     }
 
     /// Handles a stop of the vehicle: active and standby commands become void.

@@ -369,7 +369,7 @@ impl Service for OnVehicle {
         let had_control = client(before);
         if had_control.is_some() && had_control != client(context.standing()) {
             let mut controls = self.vehicle.lock();
-            self.behaviour.handle_control_end(&mut controls, context);
+            self.behaviour.handle_control_end(&mut controls);
         }
         if context.standing().may_act() && !before.may_act() {
             let mut controls = self.vehicle.lock();

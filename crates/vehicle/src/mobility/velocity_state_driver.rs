@@ -107,10 +107,9 @@ impl Behaviour for VelocityStateDriver {
         Some(SetVelocityCommand::NAME)
     }
 
-    fn handle_control_end(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+    fn handle_control_end(&mut self, controls: &mut Controls) {
         self.default = Velocity::default();
         controls.pilot.reset_limits();
-        changed(context);
     }
 
     fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {

@@ -108,6 +108,18 @@ fn limits_end_with_the_control_of_the_client_that_set_them() {
 }
 
 #[test]
+fn who_watches_limits_is_told_when_they_end_with_control() {
+    let (mut rig, _vehicle) = rig();
+    rig.stand(State::Standby, Some(CLIENT));
+    rig.send(CLIENT, &velocity(CommandType::SET_MAX_ALLOWED, 0.5, 0.2));
+    rig.changed().clear();
+    rig.stand(State::Standby, None);
+    for code in [QueryVelocityCommand::CODE, QueryAccelerationLimit::CODE] {
+        assert!(rig.changed().contains(&code), "{code:04X}");
+    }
+}
+
+#[test]
 fn a_speed_of_0_is_a_limit_that_no_driver_overcomes() {
     let (mut rig, vehicle) = rig();
     rig.send(CLIENT, &velocity(CommandType::SET_MAX_ALLOWED, 0.0, 0.0));
