@@ -518,6 +518,26 @@ impl Browser {
         self.held_key = Some(HeldKey { stop, thread });
     }
 
+    /// Holds a key until the page says that it drives and the vehicle moves as fast as this, in metres per
+    /// second. A busy machine may end the drive before: then the operator presses again.
+    #[track_caller]
+    pub(crate) fn drive_by_key(&mut self, (code, key): (&str, &str), speed: f64) {
+        const ATTEMPTS: usize = 4;
+        let moves = format!(
+            "document.querySelector('#drive-line').textContent.includes('commands are being sent') \
+             && parseFloat(document.querySelector('#speed').textContent) > {speed}"
+        );
+        for _ in 1..ATTEMPTS {
+            self.hold_key(code, key);
+            if self.holds_within(LIMIT / ATTEMPTS as u32, &moves) {
+                return;
+            }
+            self.let_go_of_key(code, key);
+        }
+        self.hold_key(code, key);
+        self.wait(&moves);
+    }
+
     /// Lets go of the key that is held.
     pub(crate) fn let_go_of_key(&mut self, code: &str, key: &str) {
         self.stop_repeats();

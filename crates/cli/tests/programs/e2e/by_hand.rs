@@ -104,8 +104,7 @@ pub(crate) fn run() {
     one_button_leads_from_arrival_to_driving(&mut page);
     every_view_is_accessible(&mut page);
     shows_the_state_in_the_tree(&mut page, "ready");
-    page.hold_key("ArrowUp", "ArrowUp");
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.drive_by_key(("ArrowUp", "ArrowUp"), 0.1);
     page.screenshot("by-hand-keys");
     page.let_go_of_key("ArrowUp", "ArrowUp");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
@@ -174,14 +173,12 @@ fn refuses_to_drive_without_news(page: &mut Browser, vehicle: &Running) {
     for screen in SCREENS {
         // A change of size ends a drive.
         page.look_on(screen);
-        page.hold_key("ArrowUp", "ArrowUp");
-        page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+        page.drive_by_key(("ArrowUp", "ArrowUp"), 0.1);
         look_from(page, screen, "by-hand-driving");
         page.let_go_of_key("ArrowUp", "ArrowUp");
     }
     page.look_on(SCREENS[0]);
-    page.hold_key("ArrowUp", "ArrowUp");
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.drive_by_key(("ArrowUp", "ArrowUp"), 0.1);
     vehicle.suspend(true);
     page.wait("document.querySelector('#drive-line').textContent.includes('picture is stale')");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");

@@ -186,8 +186,7 @@ fn is_idle(page: &mut Browser, ending: &str) {
 }
 
 fn a_key_whose_release_got_lost_stops(page: &mut Browser) {
-    page.hold_key("KeyW", "w");
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.drive_by_key(("KeyW", "w"), 0.1);
     page.stop_repeats();
     is_idle(page, "no repeats any more");
     page.wait("document.querySelector('#drive-line').textContent.includes('press again')");

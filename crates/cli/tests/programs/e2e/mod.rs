@@ -263,11 +263,7 @@ fn take_over_by_keyboard(page: &mut Browser) {
     page.press("#take-over");
     page.wait("document.body.dataset.mission === 'over'");
     page.wait("document.querySelector('#drive-line').textContent.startsWith('Ready')");
-    page.hold_key("KeyW", "w");
-    page.wait(
-        "document.querySelector('#drive-line').textContent.includes('commands are being sent')",
-    );
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.3");
+    page.drive_by_key(("KeyW", "w"), 0.3);
     page.screenshot("4-keyboard");
     page.let_go_of_key("KeyW", "w");
     page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
