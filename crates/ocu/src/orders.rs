@@ -125,6 +125,14 @@ impl StopReply {
             Self::Confirmed(reply) => reply(Err("this press was cleared since".to_owned())),
         }
     }
+
+    /// Answers a stop that has stopped nothing so far.
+    pub(super) fn refused(self, why: &str) {
+        match self {
+            Self::Taken(taken) => taken(Err(why.to_owned())),
+            Self::Confirmed(reply) => reply(Err(why.to_owned())),
+        }
+    }
 }
 
 /// The pages' interface to the session.

@@ -14,6 +14,10 @@ use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
 use crate::press::KnownStops;
 use crate::request::OperatorRequest;
 
+/// The vehicle has shown nothing that can be stopped.
+const NO_PARTS: &str =
+    "no part of the vehicle that can be stopped is known yet; each is stopped as soon as it is";
+
 impl Session {
     /// Sends an emergency at once.
     pub(super) fn handle_stop(&mut self, now: Instant, order: StopOrder) {
@@ -38,29 +42,27 @@ impl Session {
         }
         self.note_emergency(now, number, &user, true);
         let vehicle = number.and_then(|number| self.fleet.get_mut(number));
-        let vehicle = vehicle.filter(|it| it.has_managed());
-        match (vehicle, reply) {
-            (Some(vehicle), StopReply::Taken(taken)) => {
-                taken(Ok(vehicle.set_emergency(now, &mut self.client)));
-            }
-            (Some(vehicle), StopReply::Confirmed(reply)) => {
-                vehicle.set_emergency(now, &mut self.client);
-                vehicle.await_emergency(now, true, reply);
-            }
-            (None, StopReply::Taken(taken)) => taken(Err(NO_VEHICLE.to_owned())),
-            (None, StopReply::Confirmed(reply)) => reply(Err(NO_VEHICLE.to_owned())),
+        let Some(vehicle) = vehicle else {
+            return reply.refused(NO_VEHICLE);
+        };
+        let is_new = vehicle.set_emergency(now, &mut self.client);
+        match reply {
+            reply if !vehicle.has_managed() => reply.refused(NO_PARTS),
+            StopReply::Taken(taken) => taken(Ok(is_new)),
+            StopReply::Confirmed(reply) => vehicle.await_emergency(now, true, reply),
         }
     }
 
-    /// Stops all vehicles, also those that appear later.
+    /// Stops all vehicles, also those that appear later, and those of which no part is known yet.
     fn stop_all(&mut self, now: Instant, reply: StopReply) {
         let is_new = !self.all_stopped;
         self.all_stopped = true;
-        let vehicles = self.fleet.iter_mut().filter(|it| it.has_managed());
         let mut stopped = Vec::new();
-        for vehicle in vehicles {
+        for vehicle in self.fleet.iter_mut() {
             vehicle.set_emergency(now, &mut self.client);
-            stopped.push(vehicle);
+            if vehicle.has_managed() {
+                stopped.push(vehicle);
+            }
         }
         match reply {
             StopReply::Taken(taken) => taken(Ok(is_new)),

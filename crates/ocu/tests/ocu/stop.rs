@@ -151,6 +151,24 @@ async fn all_vehicles_are_stopped_by_one_frame() {
 }
 
 #[tokio::test]
+async fn a_vehicle_of_the_settings_that_is_stopped_before_it_is_there_is_stopped_when_it_comes() {
+    for (stop, answer) in [("stop-all", "ok all"), ("stop 102", "no ")] {
+        let station = Station {
+            vehicles: vec![101, 102],
+            ..Station::default()
+        };
+        let scene = Scene::with(station, 0).await;
+        let mut socket = stops(&scene).await;
+        let said = say(&mut socket, stop).await;
+        assert!(said.starts_with(answer), "{said}");
+        let late = scene.another_vehicle(102);
+        scene
+            .until(|_| late.rover.standing().state == State::Emergency)
+            .await;
+    }
+}
+
+#[tokio::test]
 async fn the_emergency_of_another_client_is_cleared_only_by_a_station_with_that_right() {
     let clear_any = json!({"type": "clear_any_emergency"});
     let of_others = |state: &serde_json::Value| state["vehicle"]["emergency_of_others"] == true;
