@@ -195,7 +195,7 @@ export class GamepadSource {
   name = "Gamepad";
   /** Index of the gamepad that is held, or null. */
   #index = null;
-  /** Gamepads that have been seen with their shoulder buttons up. */
+  /** Gamepads that have been seen with their shoulder buttons up since the last end. */
   #rested = new Set();
   #vector = [0, 0];
   #timestamp = 0;
@@ -211,7 +211,7 @@ export class GamepadSource {
     this.#readAt = time;
     const present = pads.filter((pad) => pad?.connected);
     const own = present.find((pad) => pad.index === this.#index);
-    if (!own || !isHeld(own)) this.end();
+    if (!own || !isHeld(own)) this.#drop();
     for (const index of this.#rested) {
       if (!present.some((pad) => pad.index === index)) this.#rested.delete(index);
     }
@@ -241,7 +241,13 @@ export class GamepadSource {
     return this.#vector;
   }
 
+  /** Nothing that is held counts any more, nor what was pressed since the last reading. */
   end() {
+    this.#drop();
+    this.#rested.clear();
+  }
+
+  #drop() {
     [this.#index, this.#vector] = [null, [0, 0]];
   }
 

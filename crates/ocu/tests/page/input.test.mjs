@@ -275,6 +275,17 @@ test("a gamepad drives while a shoulder button is held and its time stamp change
   assert.equal(bench.owner, "Gamepad");
 });
 
+test("a shoulder button that was pressed before a drive ended, and is read after it, drives nothing", () => {
+  const bench = new Bench();
+  bench.pad({ isHeld: false });
+  bench.input.end("the page changed its size", bench.now);
+  bench.pad();
+  assert.equal(bench.owner, null);
+  bench.pad({ isHeld: false });
+  bench.pad();
+  assert.equal(bench.owner, "Gamepad");
+});
+
 test("a gamepad that is not read any more stops", () => {
   const bench = new Bench();
   bench.pad({ isHeld: false });
