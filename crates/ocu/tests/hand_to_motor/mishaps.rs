@@ -176,7 +176,7 @@ impl Mishaps {
     /// The connections of a page break; the station learns of it later.
     fn break_connections(&mut self, world: &mut World, page: usize) {
         world.trace(|| format!("page {page}: connections break"));
-        world.witness.end(page, world.now, true);
+        world.witness.handle_break(page, world.now);
         for connection in world.pages[page].break_connections() {
             self.later(world, 1, 3000, End::Connection(page, connection));
         }

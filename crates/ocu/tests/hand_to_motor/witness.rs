@@ -63,6 +63,8 @@ struct Hold {
     failed: u8,
     /// A key that was never repeated.
     is_first: bool,
+    /// Nobody has told the page that the hand is gone.
+    is_lost: bool,
     /// Whether the page said that it can be driven.
     was_ready: bool,
     /// Whether it has moved the vehicle.
@@ -138,9 +140,22 @@ impl Witness {
             over: false,
             failed: 0,
             is_first: false,
+            is_lost: false,
             was_ready,
             has_moved: false,
         });
+    }
+
+    /// The hand of a page was lost after its last sign of life at `last`.
+    pub(crate) fn lose(&mut self, page: usize, last: Duration, has_renewed: bool) {
+        for hold in self
+            .holds
+            .iter_mut()
+            .filter(|it| it.page == page && !it.over)
+        {
+            hold.is_lost = true;
+        }
+        self.end(page, last, has_renewed);
     }
 
     /// The hand of a page is over since `last`.
@@ -154,6 +169,20 @@ impl Witness {
             hold.alive = hold.alive.min(last);
             hold.is_first = !has_renewed;
         }
+    }
+
+    /// The connections of a page break: whoever holds begins anew. If the hand is gone already, the page cannot
+    /// say so any more.
+    pub(crate) fn handle_break(&mut self, page: usize, now: Duration) {
+        const CONNECTION: u8 = 1 << 5;
+        for hold in self
+            .holds
+            .iter_mut()
+            .filter(|it| it.page == page && it.over)
+        {
+            hold.failed |= CONNECTION;
+        }
+        self.end(page, now, true);
     }
 
     pub(crate) fn stop(&mut self, now: Duration, page: usize, vehicle: usize) {
@@ -274,7 +303,9 @@ impl Witness {
         {
             let silence = now.saturating_sub(hold.alive);
             let delay = self.delay_of(hold, lives);
-            let limit = match self.driven[vehicle] == driven || !is_smooth(lives) {
+            // A page that still waits for the next sign of a lost hand sets in motion what moves again meanwhile.
+            let goes_on = self.driven[vehicle] == driven || hold.is_lost;
+            let limit = match goes_on || !is_smooth(lives) {
                 true => self.limit_of(hold) + delay,
                 false => self.limit(WAITING) + delay,
             };

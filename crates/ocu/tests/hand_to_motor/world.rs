@@ -189,9 +189,11 @@ impl World {
 
     pub(crate) fn let_go(&mut self, page: usize) {
         if let Some(grip) = self.pages[page].let_go() {
-            let is_silent = grip.gets_lost && grip.device != Device::Touch;
-            let last = if is_silent { grip.last_sign } else { self.now };
-            self.witness.end(page, last, grip.has_renewed);
+            if grip.gets_lost && grip.device != Device::Touch {
+                self.witness.lose(page, grip.last_sign, grip.has_renewed);
+            } else {
+                self.witness.end(page, self.now, grip.has_renewed);
+            }
             self.trace(|| format!("page {page}: the hand lets go: {grip:?}"));
         }
     }
@@ -200,6 +202,9 @@ impl World {
     pub(crate) fn interrupt(&mut self, page: usize, event: serde_json::Value) {
         self.trace(|| format!("page {page}: {event}"));
         self.witness.end(page, self.now, true);
+        // A hand that has not pressed yet would do so after the event.
+        let grip = &mut self.pages[page].grip;
+        *grip = grip.filter(|it| it.device != Device::Gamepad || it.has_renewed);
         self.pages[page].happen(event);
     }
 
