@@ -21,7 +21,7 @@ const LONGEST: Duration = Duration::from_secs(20);
 /// Over a link that loses nothing, nothing comes after the motors have been still for so long.
 const STILL: Duration = Duration::from_millis(1500);
 /// A link that loses packets may end each drive before something happens to it.
-const ATTEMPTS: usize = 8;
+const ATTEMPTS: usize = 16;
 
 /// Measures with one operator.
 pub(crate) struct Measurement<'a> {
