@@ -99,7 +99,7 @@ export class Flow {
     this.#unconfirmed = true;
     // During a drive the next setpoint confirms the state as well. After it, a long link would wait a
     // round trip for that; one that queues does wait.
-    if (!this.#driving && (this.#underWay.length === 0 || !this.#isOverdue)) this.#confirm();
+    if (this.#underWay.length === 0 || !(this.#driving || this.#isOverdue)) this.#confirm();
   }
 
   /** The state `seq` has arrived, but the browser shows nothing now. */

@@ -76,20 +76,6 @@ test("a station that does not confirm is not driven to", () => {
   assert.equal(it.flow.setpoint(push(0.1)), false);
 });
 
-test("during a drive no frame confirms a state alone: each is one more that a stop may have to wait for", () => {
-  const it = rig();
-  it.flow.shown(1);
-  it.flow.setpoint(push(0.1));
-  it.flow.confirmed();
-  it.taken();
-  it.now = 90;
-  it.flow.shown(2);
-  assert.deepEqual(it.taken(), []);
-  it.now = 100;
-  it.flow.setpoint(push(0.2));
-  assert.deepEqual(it.taken(), ["[2,10,0.2,0]"]);
-});
-
 test("while a setpoint is under way, the next one confirms the state as well", () => {
   const it = rig();
   it.flow.shown(1);
