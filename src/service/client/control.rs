@@ -501,7 +501,7 @@ impl Control {
                 if news.is_some() {
                     // Perhaps it ends an earlier control, and has come after the confirmation of this
                     // one: then the peer would keep a client that believes to have lost it.
-                    self.send_release(now, peer, out);
+                    out.send(peer, &ReleaseControl {});
                 }
                 news
             }
