@@ -2,7 +2,7 @@
 //! and a network delivers late what it has lost before, on each connection for itself. So a copy of a stop
 //! may arrive after the same page has cleared it, and must not stop the vehicle again; and the request that
 //! clears a stop may arrive after the next press, and must not undo that, whoever has pressed: it says which
-//! stops its operator knows of.
+//! stops its operator knows of. Copies of a stop that another page has cleared stop again.
 
 use std::collections::VecDeque;
 use std::str::FromStr;
@@ -31,13 +31,14 @@ impl FromStr for Press {
 pub(super) struct KnownStops {
     /// The last press of that page.
     pub(super) press: Press,
-    /// How many presses of all pages the station had taken, by the state that the page shows.
-    pub(super) count: u64,
+    /// How many presses of all pages the station had taken, by the state that the page shows; `None` for a
+    /// page that does not say it.
+    pub(super) count: Option<u64>,
 }
 
 /// Somebody has pressed a stop of which the operator who asks to clear it does not know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("stopped again since then: clear it again")]
+#[error("stopped again since then: look, and clear it again")]
 pub(super) struct PressedSince;
 
 /// What pages have pressed and cleared.
@@ -47,6 +48,8 @@ pub(super) struct Presses {
     all: VecDeque<Pressed>,
     /// How many have been taken.
     count: u64,
+    /// The last one that is not listed any more, although its page has not cleared it.
+    forgotten: u64,
 }
 
 /// What a page has pressed for one target.
@@ -58,7 +61,7 @@ struct Pressed {
     vehicle: Option<u16>,
     /// The last press that has arrived.
     taken: u32,
-    /// The last press that was cleared, with those before it.
+    /// The last press that its page has cleared, with those before it.
     cleared: u32,
     /// How many presses the station had taken with the last one.
     count: u64,
@@ -107,15 +110,19 @@ impl Presses {
         vehicle: Option<u16>,
     ) -> Result<(), PressedSince> {
         let Press(page, last) = known.press;
+        // What the station has not taken was counted by another one.
+        let is_counted = |count| (self.forgotten..=self.count).contains(&count);
         let is_pressed_since = self.all.iter().any(|it| {
             let is_meant = vehicle.is_none() || it.vehicle.is_none() || it.vehicle == vehicle;
             let is_known = match it.page == Some(page) {
                 true => it.taken <= last,
-                false => it.count <= known.count || it.taken <= it.cleared,
+                false => {
+                    known.count.is_none_or(|known| it.count <= known) || it.taken <= it.cleared
+                }
             };
             is_meant && !is_known
         });
-        if is_pressed_since {
+        if is_pressed_since || !known.count.is_none_or(is_counted) {
             return Err(PressedSince);
         }
         let entry = self.entry(Some(page), vehicle);
@@ -130,8 +137,11 @@ impl Presses {
             .iter()
             .position(|it| (it.page, it.vehicle) == (page, vehicle));
         let known = place.and_then(|place| self.all.remove(place));
-        if self.all.len() >= Self::MOST {
-            self.all.pop_front();
+        if self.all.len() >= Self::MOST
+            && let Some(oldest) = self.all.pop_front()
+            && oldest.taken > oldest.cleared
+        {
+            self.forgotten = self.forgotten.max(oldest.count);
         }
         self.all.push_back(known.unwrap_or(Pressed {
             page,
@@ -150,7 +160,7 @@ mod tests {
     use super::*;
 
     fn known(press: Press) -> KnownStops {
-        KnownStops { press, count: 0 }
+        KnownStops { press, count: None }
     }
 
     #[test]
@@ -211,7 +221,7 @@ mod tests {
             assert!(presses.take(Some(Press(9, 1)), Some(101)));
             let knows = |count| KnownStops {
                 press: Press(8, 1),
-                count,
+                count: Some(count),
             };
             let before = presses.count();
             assert!(presses.take(press, stopped));
@@ -244,6 +254,21 @@ mod tests {
         }
         assert_eq!(presses.all.len(), Presses::MOST);
         assert!(!presses.take(Some(Press(999, 1)), None));
+    }
+
+    #[test]
+    fn a_press_that_is_not_listed_any_more_and_one_of_another_station_are_not_known() {
+        let mut presses = Presses::default();
+        for page in 0..100 {
+            assert!(presses.take(Some(Press(page, 1)), Some(101)));
+        }
+        let knows = |count| KnownStops {
+            press: Press(999, 0),
+            count: Some(count),
+        };
+        assert_eq!(presses.clear(knows(35), Some(102)), Err(PressedSince));
+        assert_eq!(presses.clear(knows(101), Some(101)), Err(PressedSince));
+        assert_eq!(presses.clear(knows(100), Some(101)), Ok(()));
     }
 
     #[test]

@@ -22,8 +22,9 @@ pub struct Frame {
     #[serde(default)]
     pub press: Option<Press>,
     /// Of the clearing of a stop: how many stops the station had taken, by the state that the page shows.
+    /// Without it, stops of other pages do not matter.
     #[serde(default)]
-    pub stops: u64,
+    pub stops: Option<u64>,
     /// The content.
     #[serde(flatten)]
     pub said: Said,
@@ -192,7 +193,7 @@ impl Frame {
             id: None,
             vehicle: None,
             press: None,
-            stops: 0,
+            stops: None,
             said,
         })
     }
@@ -361,7 +362,7 @@ mod tests {
                     id: None,
                     vehicle: None,
                     press: None,
-                    stops: 0,
+                    stops: None,
                     said: Said::OperatorRequest(request)
                 },
                 "{text}"

@@ -22,8 +22,10 @@ export class Emergency {
   #refusal = "";
   /** How many requests to clear are not answered: what the station says meanwhile may be over with them. */
   #clearings = 0;
-  /** How many stops of all pages the station had taken by the state that is shown: those the operator knows of. */
+  /** How many stops of all pages the station had taken by the last state. The operator who clears knows of them. */
   #known = 0;
+  /** Whether the station has stopped the vehicle, which may not have reported it yet, and perhaps never can. */
+  #isSet = false;
   #vehicles = [];
   /** Whether the station stops vehicles that join. */
   #latched = false;
@@ -85,7 +87,12 @@ export class Emergency {
 
   /** Takes a state that has just arrived. What it says was said after the stops, but for what was under way. */
   handleState({ vehicle, stops }) {
+    const before = this.#known;
     this.#known = number(stops) ?? 0;
+    if (this.#known > before && !get("clear-sheet").hidden) {
+      this.#closeSheet();
+      toast("warn", "Somebody has stopped a vehicle again: look before you clear it.");
+    }
     if (vehicle) this.#confirm(vehicle, vehicle.emergency === true);
   }
 
@@ -122,6 +129,7 @@ export class Emergency {
     this.#barred = barred;
     [this.#clears, this.#clearsAny] = [clears, clearsAny];
     this.#ofOthers = live && state?.vehicle?.emergency_of_others === true;
+    this.#isSet = state?.vehicle?.stop_set === true;
     this.#condition = stopCondition(state?.vehicle, live);
     this.#speed = state?.vehicle?.velocity?.x;
     if (this.#wantedFirst && this.#link.vehicle !== null) {
@@ -142,7 +150,8 @@ export class Emergency {
   }
 
   #render() {
-    const how = this.#condition ?? (this.#barred ? "barred" : this.#isWanted ? "wanted" : "ready");
+    const isStopping = this.#isWanted || this.#isSet;
+    const how = this.#condition ?? (this.#barred ? "barred" : isStopping ? "wanted" : "ready");
     document.body.dataset.emergency = how;
     const [word, detail] = this.#condition
       ? stopWords(this.#condition, this.#speed)
@@ -153,7 +162,7 @@ export class Emergency {
         }[how];
     say(get("estop-word"), word);
     say(get("estop-detail"), detail);
-    mark(get("estop"), "aria-pressed", String(this.#condition !== null || this.#isWanted));
+    mark(get("estop"), "aria-pressed", String(this.#condition !== null || isStopping));
     show(get("runaway"), this.#condition === "runaway");
     const count = this.#vehicles.length;
     show(get("estop-all"), count > 1);
@@ -164,9 +173,10 @@ export class Emergency {
     get("latch-clear").disabled = !this.#clears;
     const stopped = this.#vehicles.filter(({ state }) => state === "emergency").length;
     show(get("clear-all"), stopped > 1 || this.#latched);
-    show(get("estop-clear"), this.#condition !== null && this.#clears);
+    const isStopped = this.#condition !== null || this.#isSet;
+    show(get("estop-clear"), isStopped && this.#clears);
     show(get("clear-any"), this.#ofOthers && this.#clearsAny);
-    if (this.#condition === null) show(get("clear-sheet"), false);
+    if (!isStopped) show(get("clear-sheet"), false);
   }
 
   #openSheet() {
@@ -185,13 +195,18 @@ export class Emergency {
 
   async #clear(request) {
     this.#closeSheet();
-    // The operator's last word counts.
+    // The operator's last word counts, unless it is refused: then what was to be stopped still is.
+    const { vehicle } = this.#link;
+    const isWanted = this.#stops.wants(vehicle);
+    const isAllWanted = this.#stops.wants("all") && request.type === "emergency_all";
     if (request.type === "emergency_all") this.#stops.cancelAll();
-    else this.#stops.cancel(this.#link.vehicle);
+    else this.#stops.cancel(vehicle);
     this.#clearings += 1;
     const reason = await this.#link.ask({ ...request, press: this.#stops.press, stops: this.#known });
     this.#clearings -= 1;
     if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);
+    if (reason !== null && isAllWanted) this.#stops.stopAll();
+    if (reason !== null && isWanted) this.#stops.stop(vehicle);
   }
 }

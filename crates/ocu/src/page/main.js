@@ -119,7 +119,7 @@ function hindered(live) {
   if (!live) return "Not connected";
   if (!trusted) return `Watching only: ${account.users ? account.hindrance : "enter the token to drive"}`;
   if (!state.vehicle) return "No vehicle";
-  if (state.vehicle.emergency) return "Emergency: clear it before driving";
+  if (state.vehicle.emergency || state.vehicle.stop_set) return "Emergency: clear it before driving";
   return state.vehicle.stale ? sentence(state.vehicle.stale) : "";
 }
 

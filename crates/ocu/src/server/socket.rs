@@ -359,7 +359,7 @@ impl Reader<'_> {
         id: Option<u64>,
         vehicle: Option<u16>,
         request: OperatorRequest,
-        (press, count): (Option<Press>, u64),
+        (press, count): (Option<Press>, Option<u64>),
     ) {
         let reply = self.recorded(id, vehicle, request);
         let may_drive = self.visitor.may(UserRole::Drive);

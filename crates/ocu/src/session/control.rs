@@ -318,7 +318,8 @@ impl Vehicle {
             .picture
             .mission()
             .is_some_and(|it| it.stage.is_driven());
-        let wanted = if is_ours && drives {
+        // Whoever has the drivers has taken them over, or the planner was lost: no report gives them back.
+        let wanted = if is_ours && drives && self.lease.wanted() != Wanted::Everything {
             Wanted::Planner
         } else {
             Wanted::Everything

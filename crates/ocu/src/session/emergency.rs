@@ -14,9 +14,9 @@ use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
 use crate::press::KnownStops;
 use crate::request::OperatorRequest;
 
-/// The vehicle has shown nothing that can be stopped.
+/// Nothing that can be stopped has shown itself.
 const NO_PARTS: &str =
-    "no part of the vehicle that can be stopped is known yet; each is stopped as soon as it is";
+    "no part of a vehicle that can be stopped is known yet; each is stopped as soon as it is";
 
 impl Session {
     /// Sends an emergency at once.
@@ -66,7 +66,7 @@ impl Session {
         }
         match reply {
             StopReply::Taken(taken) => taken(Ok(is_new)),
-            StopReply::Confirmed(reply) if stopped.is_empty() => reply(Err(NO_VEHICLE.to_owned())),
+            StopReply::Confirmed(reply) if stopped.is_empty() => reply(Err(NO_PARTS.to_owned())),
             StopReply::Confirmed(reply) => {
                 await_all(now, true, stopped, &mut self.client, reply);
             }

@@ -178,7 +178,7 @@ impl Witness {
         for hold in self
             .holds
             .iter_mut()
-            .filter(|it| it.page == page && it.over)
+            .filter(|it| it.page == page && it.is_lost)
         {
             hold.failed |= CONNECTION;
         }

@@ -70,7 +70,7 @@ async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
         let pressed = |press: u32| format!("{stop} 7.{press}");
         assert_eq!(say(&mut socket, &pressed(first)).await, answer);
         scene.until(emergency).await;
-        page.ask(json!({"type": clear, "on": false, "press": [7, first], "stops": 99}))
+        page.ask(json!({"type": clear, "on": false, "press": [7, first]}))
             .await
             .unwrap();
         scene.until(|scene| !emergency(scene)).await;

@@ -168,6 +168,39 @@ test("a stop of all is confirmed by the latch and the station's stop of each, an
   assert.deepEqual(repeated(), []);
 });
 
+test("a stop that comes while the operator is about to clear one has to be looked at first", () => {
+  const { hear } = page();
+  hear({ emergency: true, stop_set: true }, 7);
+  get("estop-clear").click();
+  assert.ok(!get("clear-sheet").hidden);
+  hear({ emergency: true, stop_set: true }, 7);
+  assert.ok(!get("clear-sheet").hidden);
+  hear({ emergency: true, stop_set: true }, 8);
+  assert.ok(get("clear-sheet").hidden);
+});
+
+test("what the station has stopped can be cleared before the vehicle reports it, or if it never does", () => {
+  const { hear } = page();
+  hear({ emergency: false, stop_set: true });
+  assert.ok(!get("estop-clear").hidden);
+  get("estop-clear").click();
+  hear({ emergency: false, stop_set: true });
+  assert.ok(!get("clear-sheet").hidden);
+  hear({ emergency: false, stop_set: false });
+  assert.ok(get("estop-clear").hidden && get("clear-sheet").hidden);
+});
+
+test("a stop that is not confirmed goes on if its clearing is refused", async () => {
+  const { emergency, hear, answer, repeated } = page();
+  hear({});
+  emergency.stop();
+  hear({ emergency: true });
+  get("clear-yes").click();
+  assert.deepEqual(repeated(), []);
+  await answer("stopped again since then");
+  assert.deepEqual(repeated(), ["stop 101"]);
+});
+
 test("who clears a stop says which stops the shown state knows of, and none of another connection", async () => {
   const { asked, emergency, hear, link, answer } = page();
   hear({ emergency: true, stop_set: true }, 7);
