@@ -417,13 +417,16 @@ impl Control {
         match (self.state, code) {
             (State::Asking | State::Held, 0) => {
                 // The confirmation does not say which request it answers. It may be the first, and
-                // the others lost.
-                self.confirmed = self.first_asked;
+                // the others lost. Over a long way the repetitions are confirmed as well, later: those
+                // confirm nothing new.
+                if self.asked > 0 {
+                    self.confirmed = self.first_asked;
+                    self.next = now + self.renewal();
+                }
                 self.asked = 0;
                 self.denied = false;
                 let granted = self.state == State::Asking;
                 self.state = State::Held;
-                self.next = now + self.renewal();
                 self.status.next.get_or_insert(now);
                 granted.then_some(ControlNews::Granted)
             }

@@ -191,6 +191,26 @@ fn a_silent_peer_has_taken_control_along_before_its_own_time_is_up() {
 }
 
 #[test]
+fn control_lasts_over_a_way_on_which_every_repetition_is_confirmed_late() {
+    const ROUND_TRIP: Duration = Duration::from_millis(1600);
+    let (mut bench, _) = held(4);
+    let mut under_way = std::collections::VecDeque::new();
+    let end = bench.now + Duration::from_secs(60);
+    while bench.now < end {
+        bench.run_ms(10);
+        under_way.extend(bench.sent::<RequestControl>().iter().map(|_| bench.now));
+        while under_way
+            .front()
+            .is_some_and(|&at| at + ROUND_TRIP <= bench.now)
+        {
+            under_way.pop_front();
+            bench.hear(PEER, &confirm(0));
+        }
+        assert_eq!(news(&mut bench), []);
+    }
+}
+
+#[test]
 fn control_that_is_taken_is_lost_and_not_asked_for_again() {
     let (mut bench, _) = held(5);
     bench.hear(PEER, &reject(0));
