@@ -343,6 +343,7 @@ impl Vehicle {
             return reply(Ok(()));
         }
         self.stop_driving(now, client);
+        self.manual.forget();
         let sessions = self.release();
         self.ownership.release();
         client.tell(reply, async move {

@@ -134,6 +134,17 @@ async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stoppe
     page.ask(json!({"type": "drive_end"})).await.unwrap();
     let state = page.until(|state| state["drive"]["active"] == false).await;
     assert_eq!(state["drive"]["reason"], "", "it was let go");
+
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    page.until(silent).await;
+    page.ask(json!({"type": "control", "on": false}))
+        .await
+        .unwrap();
+    let state = page.until(|state| state["control"]["held"] == false).await;
+    assert_eq!(
+        state["drive"]["reason"], "",
+        "the next operator did not drive"
+    );
 }
 
 /// A planner with mission 7 in the given stage, which drives when it is told to continue.
