@@ -519,23 +519,39 @@ impl Browser {
     }
 
     /// Holds a key until the page says that it drives and the vehicle moves as fast as this, in metres per
-    /// second. A busy machine may end the drive before: then the operator presses again.
+    /// second.
     #[track_caller]
     pub(crate) fn drive_by_key(&mut self, (code, key): (&str, &str), speed: f64) {
-        const ATTEMPTS: usize = 4;
         let moves = format!(
             "document.querySelector('#drive-line').textContent.includes('commands are being sent') \
              && parseFloat(document.querySelector('#speed').textContent) > {speed}"
         );
+        self.drive(
+            |page| page.hold_key(code, key),
+            |page| page.let_go_of_key(code, key),
+            &moves,
+        );
+    }
+
+    /// Takes something up until an expression is true. A busy machine may end the drive before: then the
+    /// operator lets go and takes it up again.
+    #[track_caller]
+    pub(crate) fn drive(
+        &mut self,
+        take_up: impl Fn(&mut Self),
+        let_go: impl Fn(&mut Self),
+        moves: &str,
+    ) {
+        const ATTEMPTS: u32 = 4;
         for _ in 1..ATTEMPTS {
-            self.hold_key(code, key);
-            if self.holds_within(LIMIT / ATTEMPTS as u32, &moves) {
+            take_up(self);
+            if self.holds_within(LIMIT / 10, moves) {
                 return;
             }
-            self.let_go_of_key(code, key);
+            let_go(self);
         }
-        self.hold_key(code, key);
-        self.wait(&moves);
+        take_up(self);
+        self.wait(moves);
     }
 
     /// Lets go of the key that is held.

@@ -109,8 +109,11 @@ pub(crate) fn run() {
     page.let_go_of_key("ArrowUp", "ArrowUp");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
 
-    page.hold("#stick", (0.0, -0.6));
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.drive(
+        |page| page.hold("#stick", (0.0, -0.6)),
+        Browser::let_go,
+        "parseFloat(document.querySelector('#speed').textContent) > 0.1",
+    );
     page.screenshot("by-hand-stick");
     page.key_down("Escape", "Escape");
     page.wait("document.body.dataset.emergency === 'stopped'");

@@ -58,11 +58,14 @@ impl Source {
         }
     }
 
+    /// What is true while it drives.
+    fn drives(self) -> String {
+        format!("document.querySelector('#drive-source').textContent === '{self:?}'")
+    }
+
     #[track_caller]
-    fn drives(self, page: &mut Browser) {
-        page.wait(&format!(
-            "document.querySelector('#drive-source').textContent === '{self:?}'"
-        ));
+    fn drive(self, page: &mut Browser, moves: &str) {
+        page.drive(|page| self.take_up(page), |page| self.let_go(page), moves);
     }
 }
 
@@ -152,9 +155,8 @@ pub(crate) fn run() {
 }
 
 fn moves_while_it_is_held(page: &mut Browser, source: Source) {
-    source.take_up(page);
-    source.drives(page);
-    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    let moves = "parseFloat(document.querySelector('#speed').textContent) > 0.1";
+    source.drive(page, &format!("{} && {moves}", source.drives()));
     source.let_go(page);
     is_idle(page, "let go");
     page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
@@ -163,8 +165,7 @@ fn moves_while_it_is_held(page: &mut Browser, source: Source) {
 /// The drive ends, and does not begin again before its source was let go.
 #[track_caller]
 fn ends(page: &mut Browser, source: Source, ending: &str, happen: impl FnOnce(&mut Browser)) {
-    source.take_up(page);
-    source.drives(page);
+    source.drive(page, &source.drives());
     page.value("(globalThis.isDriven = new Set(), clearInterval(globalThis.watching), 0)");
     happen(page);
     is_idle(page, ending);
@@ -202,8 +203,7 @@ fn a_gamepad_that_is_out_of_range_or_gone_stops(page: &mut Browser) {
             "(pad.connected = true, dispatchEvent(new Event('gamepadconnected')))",
         ),
     ] {
-        Source::Gamepad.take_up(page);
-        Source::Gamepad.drives(page);
+        Source::Gamepad.drive(page, &Source::Gamepad.drives());
         page.value(loss);
         is_idle(page, loss);
         page.value(ending);
@@ -219,11 +219,14 @@ fn a_finger_that_rests_drives_and_its_place_is_the_centre(page: &mut Browser) {
     let (x, y) = middle(page, "#stick");
     let rim = page.value("document.querySelector('#stick').getBoundingClientRect().y");
     let rim = rim.as_f64().unwrap() + 6.0;
-    touch(page, "touchStart", Some((x, rim)));
-    Source::Touch.drives(page);
+    page.drive(
+        |page| touch(page, "touchStart", Some((x, rim))),
+        |page| touch(page, "touchEnd", None),
+        &Source::Touch.drives(),
+    );
     assert_eq!(page.text("#forward-value"), "0 %");
     std::thread::sleep(2 * HELD_ON);
-    Source::Touch.drives(page);
+    page.wait(&Source::Touch.drives());
     page.screenshot("input-phone");
     page.look_on(SCREENS[4]);
     is_idle(page, "rotated");

@@ -59,8 +59,11 @@ fn sets_a_zone(system: &System, page: &mut Browser) {
 }
 
 fn says_why_the_vehicle_is_held(page: &mut Browser) {
-    page.hold("#stick", (0.0, -0.9));
-    page.wait("!document.querySelector('#held').hidden");
+    page.drive(
+        |page| page.hold("#stick", (0.0, -0.9)),
+        Browser::let_go,
+        "!document.querySelector('#held').hidden",
+    );
     page.wait("document.querySelector('#held').textContent.includes('the operating zone')");
     page.wait("document.querySelector('#drive-line').textContent.startsWith('Held: ')");
     page.screenshot("8-held");
@@ -74,8 +77,11 @@ fn says_stopped_only_at_rest(page: &mut Browser) {
         "(globalThis.said = []), setInterval(() => said.push([document.querySelector('#estop').textContent, \
          {SPEED}]), 20), 0"
     ));
-    page.hold("#stick", (0.0, 0.9));
-    page.wait(&format!("{SPEED} > 0.3"));
+    page.drive(
+        |page| page.hold("#stick", (0.0, 0.9)),
+        Browser::let_go,
+        &format!("{SPEED} > 0.3"),
+    );
     page.key_down("Escape", "Escape");
     page.key_up("Escape", "Escape");
     page.wait("document.body.dataset.emergency === 'stopped'");
