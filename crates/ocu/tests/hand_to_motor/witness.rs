@@ -59,6 +59,8 @@ struct Hold {
     /// When all was well for the last time: the hand, and every part of the way to the motor.
     alive: Duration,
     over: bool,
+    /// The last sign of a hand that is over.
+    last: Duration,
     /// The parts that have failed since then.
     failed: u8,
     /// A key that was never repeated.
@@ -138,6 +140,7 @@ impl Witness {
             begun: now,
             alive: now,
             over: false,
+            last: now,
             failed: 0,
             is_first: false,
             is_lost: false,
@@ -166,6 +169,7 @@ impl Witness {
             .filter(|it| it.page == page && !it.over)
         {
             hold.over = true;
+            hold.last = last;
             hold.alive = hold.alive.min(last);
             hold.is_first = !has_renewed;
         }
@@ -301,14 +305,15 @@ impl Witness {
             .iter()
             .filter(|it| (it.vehicle, it.way) == (vehicle, way))
         {
-            let silence = now.saturating_sub(hold.alive);
             let delay = self.delay_of(hold, lives);
             // A page that still waits for the next sign of a lost hand sets in motion what moves again meanwhile.
             let goes_on = self.driven[vehicle] == driven || hold.is_lost;
-            let limit = match goes_on || !is_smooth(lives) {
-                true => self.limit_of(hold) + delay,
-                false => self.limit(WAITING) + delay,
+            // What begins was sent while the hand held, perhaps as soon as the rest of the way was there again.
+            let (since, limit) = match goes_on || !is_smooth(lives) {
+                true => (hold.alive, self.limit_of(hold)),
+                false => (hold.last.max(hold.alive), self.limit(WAITING)),
             };
+            let (silence, limit) = (now.saturating_sub(since), limit + delay);
             if silence <= limit {
                 let late = silence.saturating_sub(delay);
                 self.longest = self.longest.max(late);
