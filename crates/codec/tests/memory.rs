@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::alloc::System;
+use std::sync::Mutex;
 use std::thread;
 
 use jaus_codec::{Bytes, DecodeErrorKind, LargeArray, Reader};
@@ -10,11 +11,15 @@ use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
+/// The allocator counts for all threads: one test at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// Much more memory than the octet that it takes at least.
 type Large = [u64; 512];
 
 #[test]
 fn a_list_allocates_no_more_in_advance_than_the_message_has_octets() {
+    let _alone = ALONE.lock();
     let octets = Bytes::from([&60_000_u16.to_le_bytes()[..], &[0; 60_000]].concat());
     let region = Region::new(ALLOCATOR);
     let mut reader = Reader::new(&octets);
@@ -37,6 +42,7 @@ fn a_list_allocates_no_more_in_advance_than_the_message_has_octets() {
 
 #[test]
 fn a_large_array_is_never_on_the_stack() {
+    let _alone = ALONE.lock();
     let small_stack = thread::Builder::new().stack_size(256 << 10);
     let run = || {
         let mut array = LargeArray::<f64, 131_072>::default();
