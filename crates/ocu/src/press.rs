@@ -1,8 +1,9 @@
 //! Presses of the emergency stop. A page repeats a stop over several connections until it is confirmed,
 //! and a network delivers late what it has lost before, on each connection for itself. So a copy of a stop
 //! may arrive after the same page has cleared it, and must not stop the vehicle again; and the request that
-//! clears a stop may arrive after the next press, and must not undo that, whoever has pressed: it says which
-//! stops its operator knows of. Copies of a stop that another page has cleared stop again.
+//! clears a stop may arrive after the next press, and must not undo it, whichever page it came from. So
+//! the request says which stops its operator knows about. A late copy of a stop that another page has cleared does
+//! stop the vehicle again.
 
 use std::collections::VecDeque;
 use std::str::FromStr;
@@ -36,7 +37,7 @@ pub(super) struct KnownStops {
     pub(super) count: Option<u64>,
 }
 
-/// Somebody has pressed a stop of which the operator who asks to clear it does not know.
+/// There is a newer stop, which the operator who asks to clear does not know about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("stopped again since then: look, and clear it again")]
 pub(super) struct PressedSince;

@@ -318,7 +318,8 @@ impl Vehicle {
             .picture
             .mission()
             .is_some_and(|it| it.stage.is_driven());
-        // Whoever has the drivers has taken them over, or the planner was lost: no report gives them back.
+        // A station that controls the drivers has taken over from the planner, or has lost it. The planner's own
+        // report is no reason to hand them back.
         let wanted = if is_ours && drives && self.lease.wanted() != Wanted::Everything {
             Wanted::Planner
         } else {

@@ -175,8 +175,8 @@ impl Witness {
         }
     }
 
-    /// The connections of a page break: whoever holds begins anew. If the hand is gone already, the page cannot
-    /// say so any more.
+    /// The connections of a page break, which ends what is held. If the hand was lost before, the page can no
+    /// longer report that.
     pub(crate) fn handle_break(&mut self, page: usize, now: Duration) {
         const CONNECTION: u8 = 1 << 5;
         for hold in self
