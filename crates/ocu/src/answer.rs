@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::page_link::PageLinkQuality;
+use super::press::Press;
 use super::state::{Fleet, Overlay, State, Tree};
 
 /// One frame to a page.
@@ -42,6 +43,12 @@ pub(super) enum Said<'a> {
     },
     /// The session has handled a setpoint or the end of manual drive.
     Ok,
+    /// A stop was taken and sent.
+    Stopped {
+        press: Press,
+        /// How many stops of all pages the station had taken with it, as in [`State`].
+        stops: u64,
+    },
     /// A request succeeded.
     Done {
         id: u64,

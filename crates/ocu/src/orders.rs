@@ -109,29 +109,54 @@ pub(super) enum StopTarget {
     All,
 }
 
-/// When the sender of a stop gets its answer.
-pub(super) enum StopReply {
-    /// As soon as the stop is sent: whether it is new.
-    Taken(Box<dyn FnOnce(Result<bool, String>) + Send>),
-    /// When every part has confirmed it.
-    Confirmed(Reply),
+/// Callback for a stop that is taken, or the reason why it has stopped nothing so far.
+pub(super) type TakenReply = Box<dyn FnOnce(Result<TakenStop, &str>) + Send>;
+
+/// The two answers to a stop.
+pub(super) struct StopReply {
+    /// Called as soon as the stop is sent, or if it has stopped nothing so far.
+    pub(super) taken: TakenReply,
+    /// Called when every part has confirmed it, if the sender waits for that.
+    pub(super) confirmed: Option<Reply>,
+}
+
+/// A stop that the station has taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TakenStop {
+    /// Whether it stops what was not stopped before.
+    pub(super) is_new: bool,
+    /// How many presses the station had taken with it: states that name as many or more are younger. `None` for a
+    /// late copy of a press that was cleared since, which stops nothing.
+    pub(super) count: Option<u64>,
 }
 
 impl StopReply {
     /// Answers a late copy of a stop that was cleared since.
     pub(super) fn ignored(self) {
-        match self {
-            Self::Taken(taken) => taken(Ok(false)),
-            Self::Confirmed(reply) => reply(Err("this press was cleared since".to_owned())),
+        (self.taken)(Ok(TakenStop {
+            is_new: false,
+            count: None,
+        }));
+        if let Some(confirmed) = self.confirmed {
+            confirmed(Err("this press was cleared since".to_owned()));
         }
     }
 
     /// Answers a stop that has stopped nothing so far.
     pub(super) fn refused(self, why: &str) {
-        match self {
-            Self::Taken(taken) => taken(Err(why.to_owned())),
-            Self::Confirmed(reply) => reply(Err(why.to_owned())),
+        (self.taken)(Err(why));
+        if let Some(confirmed) = self.confirmed {
+            confirmed(Err(why.to_owned()));
         }
+    }
+
+    /// Answers that the stop is sent. Returns the callback for its confirmation.
+    pub(super) fn taken(self, is_new: bool, count: u64) -> Option<Reply> {
+        (self.taken)(Ok(TakenStop {
+            is_new,
+            count: Some(count),
+        }));
+        self.confirmed
     }
 }
 

@@ -211,7 +211,10 @@ impl Picture {
         }
         (part.heard, part.is_down) = (Some(now), false);
         match report {
-            Report::Status(what) => part.status = Some(Sample { what, by, at: now }),
+            Report::Status(what) => {
+                part.status = Some(Sample { what, by, at: now });
+                part.is_clearing &= part.is(State::Emergency);
+            }
             Report::Control(what) => part.controller = Some(Sample { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
             Report::Pose(what, sampled) => {
@@ -370,11 +373,26 @@ impl Picture {
         is_lost.then_some((planner, Absence::Silent))
     }
 
+    /// A part is told to end its emergency.
+    pub(super) fn handle_clearing(&mut self, part: JausId) {
+        if let Some(part) = self.parts.get_mut(&part) {
+            part.is_clearing = true;
+        }
+    }
+
+    /// A part has answered after it was told to stop: what it reports from now on is its state after that.
+    pub(super) fn handle_stopped(&mut self, part: JausId) {
+        if let Some(part) = self.parts.get_mut(&part) {
+            part.is_clearing = false;
+        }
+    }
+
     /// The parts that can enter emergency and have not recently reported it.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
             let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < self.depth.fresh();
-            part.is(State::Emergency) && part.status.as_ref().is_some_and(fresh)
+            let is_recent = part.status.as_ref().is_some_and(fresh);
+            part.is(State::Emergency) && !part.is_clearing && is_recent
         };
         let managed = self.parts.iter().filter(|(_, part)| part.managed);
         managed

@@ -6,13 +6,21 @@
 //! stop the vehicle again.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// One press of a stop: a random number of the page that is loaded, and the number of the press.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Press(u32, u32);
+
+/// `PAGE.NUMBER`.
+impl fmt::Display for Press {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.0, self.1)
+    }
+}
 
 /// Written `PAGE.NUMBER`.
 impl FromStr for Press {
@@ -72,21 +80,23 @@ impl Presses {
     /// More than pages press and clear within the time that a network delays.
     const MOST: usize = 64;
 
-    /// Notes a press for a vehicle, or for all. Returns whether it counts: the page has not cleared it.
-    pub(super) fn take(&mut self, press: Option<Press>, vehicle: Option<u16>) -> bool {
-        let is_cleared = press.is_some_and(|press| self.is_cleared(press, vehicle));
-        if !is_cleared {
-            let count = self.count + 1;
-            let entry = self.entry(press.map(|it| it.0), vehicle);
-            // What names no press may be a copy or not: it counts as a new one.
-            let number = press.map_or(entry.taken.saturating_add(1), |it| it.1);
-            if number > entry.taken {
-                entry.taken = number;
-                entry.count = count;
-                self.count = count;
-            }
+    /// Notes a press for a vehicle, or for all. Returns how many presses have been taken with the last
+    /// one of this page; `None` if it does not count, because the page has cleared it.
+    pub(super) fn take(&mut self, press: Option<Press>, vehicle: Option<u16>) -> Option<u64> {
+        if press.is_some_and(|press| self.is_cleared(press, vehicle)) {
+            return None;
         }
-        !is_cleared
+        let count = self.count + 1;
+        let entry = self.entry(press.map(|it| it.0), vehicle);
+        // What names no press may be a copy or not: it counts as a new one.
+        let number = press.map_or(entry.taken.saturating_add(1), |it| it.1);
+        if number <= entry.taken {
+            return Some(entry.count);
+        }
+        entry.taken = number;
+        entry.count = count;
+        self.count = count;
+        Some(count)
     }
 
     fn is_cleared(&self, press: Press, vehicle: Option<u16>) -> bool {
@@ -167,27 +177,61 @@ mod tests {
     #[test]
     fn a_press_is_cleared_with_those_before_it_and_none_after_it() {
         let mut presses = Presses::default();
-        assert!(presses.take(Some(Press(7, 3)), Some(101)));
-        assert!(presses.take(Some(Press(7, 3)), Some(101)), "a copy");
-        assert_eq!(presses.clear(known(Press(7, 3)), Some(101)), Ok(()));
-        assert!(!presses.take(Some(Press(7, 3)), Some(101)), "a late copy");
-        assert!(!presses.take(Some(Press(7, 1)), Some(101)));
+        assert!(presses.take(Some(Press(7, 3)), Some(101)).is_some());
         assert!(
-            presses.take(Some(Press(7, 3)), Some(102)),
+            presses.take(Some(Press(7, 3)), Some(101)).is_some(),
+            "a copy"
+        );
+        assert_eq!(presses.clear(known(Press(7, 3)), Some(101)), Ok(()));
+        assert!(
+            presses.take(Some(Press(7, 3)), Some(101)).is_none(),
+            "a late copy"
+        );
+        assert!(presses.take(Some(Press(7, 1)), Some(101)).is_none());
+        assert!(
+            presses.take(Some(Press(7, 3)), Some(102)).is_some(),
             "another vehicle"
         );
-        assert!(presses.take(Some(Press(7, 3)), None), "all vehicles");
-        assert!(presses.take(Some(Press(8, 1)), Some(101)), "another page");
-        assert!(presses.take(Some(Press(7, 4)), Some(101)), "a new press");
+        assert!(
+            presses.take(Some(Press(7, 3)), None).is_some(),
+            "all vehicles"
+        );
+        assert!(
+            presses.take(Some(Press(8, 1)), Some(101)).is_some(),
+            "another page"
+        );
+        assert!(
+            presses.take(Some(Press(7, 4)), Some(101)).is_some(),
+            "a new press"
+        );
+    }
+
+    #[test]
+    fn a_copy_of_a_press_counts_as_the_press() {
+        let mut presses = Presses::default();
+        assert_eq!(presses.take(Some(Press(7, 1)), Some(101)), Some(1));
+        assert_eq!(presses.take(Some(Press(8, 1)), Some(101)), Some(2));
+        assert_eq!(
+            presses.take(Some(Press(7, 1)), Some(101)),
+            Some(1),
+            "a copy"
+        );
+        assert_eq!(presses.take(Some(Press(7, 2)), Some(101)), Some(3));
+        assert_eq!(
+            presses.take(Some(Press(7, 1)), Some(101)),
+            Some(3),
+            "overtaken"
+        );
+        assert_eq!(presses.take(None, Some(101)), Some(4));
     }
 
     #[test]
     fn clearing_all_clears_the_presses_for_each() {
         let mut presses = Presses::default();
         assert_eq!(presses.clear(known(Press(7, 3)), None), Ok(()));
-        assert!(!presses.take(Some(Press(7, 3)), None));
-        assert!(!presses.take(Some(Press(7, 2)), Some(101)));
-        assert!(presses.take(Some(Press(7, 4)), None));
+        assert!(presses.take(Some(Press(7, 3)), None).is_none());
+        assert!(presses.take(Some(Press(7, 2)), Some(101)).is_none());
+        assert!(presses.take(Some(Press(7, 4)), None).is_some());
     }
 
     #[test]
@@ -200,11 +244,14 @@ mod tests {
             (Some(102), Some(101), true),
         ] {
             let mut presses = Presses::default();
-            assert!(presses.take(Some(Press(7, 5)), Some(101)));
-            assert!(presses.take(Some(Press(7, 6)), stopped));
+            assert!(presses.take(Some(Press(7, 5)), Some(101)).is_some());
+            assert!(presses.take(Some(Press(7, 6)), stopped).is_some());
             let late = presses.clear(known(Press(7, 5)), cleared);
             assert_eq!(late.is_ok(), is_undone, "{stopped:?} {cleared:?}");
-            assert!(presses.take(Some(Press(7, 6)), stopped), "it goes on");
+            assert!(
+                presses.take(Some(Press(7, 6)), stopped).is_some(),
+                "it goes on"
+            );
             assert_eq!(presses.clear(known(Press(7, 6)), cleared), Ok(()));
         }
     }
@@ -219,18 +266,18 @@ mod tests {
             (Some(Press(7, 6)), Some(102), Some(101), true),
         ] {
             let mut presses = Presses::default();
-            assert!(presses.take(Some(Press(9, 1)), Some(101)));
+            assert!(presses.take(Some(Press(9, 1)), Some(101)).is_some());
             let knows = |count| KnownStops {
                 press: Press(8, 1),
                 count: Some(count),
             };
             let before = presses.count();
-            assert!(presses.take(press, stopped));
+            assert!(presses.take(press, stopped).is_some());
             let late = presses.clear(knows(before), cleared);
             assert_eq!(late.is_ok(), is_undone, "{press:?} {stopped:?} {cleared:?}");
             let now = presses.count();
             assert!(
-                presses.take(press, stopped),
+                presses.take(press, stopped).is_some(),
                 "a copy, unless it names no press"
             );
             assert_eq!(presses.count() == now, press.is_some());
@@ -241,7 +288,7 @@ mod tests {
     #[test]
     fn what_its_own_page_has_cleared_needs_no_other_page_that_knows_of_it() {
         let mut presses = Presses::default();
-        assert!(presses.take(Some(Press(7, 6)), Some(101)));
+        assert!(presses.take(Some(Press(7, 6)), Some(101)).is_some());
         assert_eq!(presses.clear(known(Press(7, 6)), Some(101)), Ok(()));
         assert_eq!(presses.clear(known(Press(8, 0)), Some(101)), Ok(()));
     }
@@ -250,18 +297,18 @@ mod tests {
     fn what_many_pages_press_is_bounded() {
         let mut presses = Presses::default();
         for page in 0..1000 {
-            assert!(presses.take(Some(Press(page, 1)), None));
+            assert!(presses.take(Some(Press(page, 1)), None).is_some());
             assert_eq!(presses.clear(known(Press(page, 1)), None), Ok(()));
         }
         assert_eq!(presses.all.len(), Presses::MOST);
-        assert!(!presses.take(Some(Press(999, 1)), None));
+        assert!(presses.take(Some(Press(999, 1)), None).is_none());
     }
 
     #[test]
     fn a_press_that_is_not_listed_any_more_and_one_of_another_station_are_not_known() {
         let mut presses = Presses::default();
         for page in 0..100 {
-            assert!(presses.take(Some(Press(page, 1)), Some(101)));
+            assert!(presses.take(Some(Press(page, 1)), Some(101)).is_some());
         }
         let knows = |count| KnownStops {
             press: Press(999, 0),
@@ -273,8 +320,10 @@ mod tests {
     }
 
     #[test]
-    fn a_press_is_read_from_text() {
-        assert_eq!("16777215.12".parse(), Ok(Press(16_777_215, 12)));
+    fn a_press_is_written_as_it_is_read() {
+        let press = Press(16_777_215, 12);
+        assert_eq!(press.to_string().parse(), Ok(press));
+        assert_eq!(press.to_string(), "16777215.12");
         for wrong in ["", "1", "1.", ".1", "1.2.3", "-1.2", "1.4294967296"] {
             assert_eq!(wrong.parse::<Press>(), Err(()), "{wrong}");
         }

@@ -37,6 +37,8 @@ pub struct Fleet {
     pub vehicles: Vec<FleetVehicle>,
     /// Whether all vehicles are to be in emergency, also those that appear later.
     pub all_stopped: bool,
+    /// How many stops of all pages the station has taken, without copies of them.
+    pub stops: u64,
 }
 
 /// A vehicle in the list.

@@ -20,8 +20,6 @@ export class Emergency {
   #condition = null;
   #speed = null;
   #refusal = "";
-  /** How many requests to clear are not answered: what the station says meanwhile may be over with them. */
-  #clearings = 0;
   /** How many stops of all pages the station had taken by the last state. The operator who clears knows of them. */
   #known = 0;
   /** Whether the station has stopped the vehicle, which may not have reported it yet, and perhaps never can. */
@@ -85,7 +83,7 @@ export class Emergency {
     navigator.vibrate?.(80);
   }
 
-  /** Takes a state that has just arrived. What it says was said after the stops, but for what was under way. */
+  /** Takes a state that has just arrived. */
   handleState({ vehicle, stops }) {
     const before = this.#known;
     this.#known = number(stops) ?? 0;
@@ -93,18 +91,18 @@ export class Emergency {
       this.#closeSheet();
       toast("warn", "Somebody has stopped a vehicle again: look before you clear it.");
     }
-    if (vehicle) this.#confirm(vehicle, vehicle.emergency === true);
+    if (vehicle) this.#confirm(vehicle, vehicle.emergency === true, stops);
   }
 
   /** Takes a list of vehicles that has just arrived, and whether all are to be stopped. */
-  handleFleet({ vehicles, allStopped }) {
-    for (const vehicle of vehicles) this.#confirm(vehicle, vehicle.state === "emergency");
-    if (this.#clearings === 0 && allStopped && pendingStops(vehicles) === 0) this.#stops.cancel("all");
+  handleFleet({ vehicles, allStopped, stops }) {
+    for (const vehicle of vehicles) this.#confirm(vehicle, vehicle.state === "emergency", stops);
+    if (allStopped && pendingStops(vehicles) === 0) this.#stops.confirm("all", stops);
   }
 
-  /** Takes what the station says of a vehicle, and whether that reports its emergency. */
-  #confirm({ subsystem, stop_set: isSet }, isStopped) {
-    if (this.#clearings === 0 && isSet === true && isStopped) this.#stops.cancel(subsystem);
+  /** Takes what the station says of a vehicle with so many stops, and whether that reports its emergency. */
+  #confirm({ subsystem, stop_set: isSet }, isStopped, stops) {
+    if (isSet === true && isStopped) this.#stops.confirm(subsystem, stops);
   }
 
   /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. With
@@ -201,9 +199,7 @@ export class Emergency {
     const isAllWanted = this.#stops.wants("all") && request.type === "emergency_all";
     if (request.type === "emergency_all") this.#stops.cancelAll();
     else this.#stops.cancel(vehicle);
-    this.#clearings += 1;
     const reason = await this.#link.ask({ ...request, press: this.#stops.press, stops: this.#known });
-    this.#clearings -= 1;
     if (reason === null) toast("good", request.type === "emergency" ? "Emergency cleared." : "All emergencies cleared.");
     else toast("bad", reason);
     if (reason !== null && isAllWanted) this.#stops.stopAll();

@@ -9,6 +9,7 @@ export class Fleet {
   #select;
   #vehicles = [];
   #allStopped = false;
+  #stops = null;
   #rows = new Map();
 
   /** Calls `select` with the number of a vehicle that the operator chooses. */
@@ -27,9 +28,15 @@ export class Fleet {
     return this.#allStopped;
   }
 
+  /** How many stops of all pages the station had taken when it made the list; null if it does not say it. */
+  get stops() {
+    return this.#stops;
+  }
+
   /** Takes a list of vehicles. */
-  handle({ vehicles, all_stopped: allStopped }) {
+  handle({ vehicles, all_stopped: allStopped, stops }) {
     this.#allStopped = allStopped === true;
+    this.#stops = number(stops);
     this.#vehicles = list(vehicles, MOST).filter((one) => number(one?.subsystem) !== null);
   }
 

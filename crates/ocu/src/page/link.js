@@ -259,6 +259,7 @@ export class Link extends EventTarget {
         if (!this.#answer(number(frame.id), reason)) this.#emit("refused", reason);
         break;
       }
+      case "stopped":
       case "message":
       case "lost":
         this.#emit(frame.type, frame);

@@ -2,6 +2,8 @@
 // all of them at once, so that it waits for no other frame and for no lost packet of another
 // connection. Each is repeated until it is cancelled, over reconnections as well.
 
+import { number } from "./dom.js";
+
 const FIRST_PAUSE = 250;
 const LONGEST_PAUSE = 4_000;
 /** The station says something every 10 s, which a slow link delays. A connection that is silent for so long is given up. */
@@ -19,7 +21,8 @@ const CONNECTIONS = 2;
 export class StopLink extends EventTarget {
   #link;
   #channels;
-  /** The stops that are repeated, by subsystem or `all`: each as a frame here and as a request of `link`. */
+  /** The stops that are repeated, by subsystem or `all`: each as a frame here and as a request of `link`, with
+   * its press, and how many stops the station had taken with it, once it says so. */
   #stops = new Map();
   #timer = 0;
   #repeats = 0;
@@ -30,18 +33,21 @@ export class StopLink extends EventTarget {
   constructor(link, connect = () => new WebSocket(address(), link.protocols)) {
     super();
     this.#link = link;
+    link.addEventListener("stopped", ({ detail: { press, stops } }) => this.#note(String(press?.join?.(".")), stops));
     const events = {
       connect,
       token: () => link.token,
       opened: (channel) => channel.send(this.#frames),
       isPressing: () => this.#stops.size > 0,
+      taken: (press, stops) => this.#note(press, stops),
       refused: (reason) => this.dispatchEvent(new CustomEvent("refused", { detail: reason })),
     };
     this.#channels = Array.from({ length: CONNECTIONS }, () => new Channel(events));
   }
 
-  /** Opens the connections and keeps them open. */
+  /** Opens the connections and keeps them open: to a station that may count its stops from the start. */
   start() {
+    for (const stop of this.#stops.values()) stop.count = Infinity;
     for (const channel of this.#channels) channel.start();
   }
 
@@ -75,6 +81,12 @@ export class StopLink extends EventTarget {
     return this.#stops.has(target);
   }
 
+  /** The station has the stop of a subsystem or `all` in force, as it says of a moment when it had taken so many
+   * stops. Said of a moment before, it was another stop. */
+  confirm(target, stops) {
+    if (number(stops) !== null && stops >= (this.#stops.get(target)?.count ?? Infinity)) this.cancel(target);
+  }
+
   /** Ends the repetitions for a subsystem or `all`. */
   cancel(target) {
     this.#stops.delete(target);
@@ -94,10 +106,17 @@ export class StopLink extends EventTarget {
   #begin(target, frame, request) {
     clearTimeout(this.#timer);
     this.#press[1] += 1;
-    const press = this.press;
-    this.#stops.set(target, { frame: `${frame} ${press.join(".")}`, request: { ...request, on: true, press } });
+    const press = this.press.join(".");
+    const stop = { frame: `${frame} ${press}`, request: { ...request, on: true, press: this.press } };
+    this.#stops.set(target, { ...stop, press, count: Infinity });
     this.#repeats = 0;
     this.#repeat();
+  }
+
+  /** The station has taken a press, which was so many stops in all. */
+  #note(press, stops) {
+    if (number(stops) === null) return;
+    for (const stop of this.#stops.values()) if (stop.press === press) stop.count = stops;
   }
 
   #repeat() {
@@ -166,7 +185,9 @@ class Channel {
     socket.addEventListener("message", ({ data }) => {
       if (socket !== this.#socket) return;
       this.#hear(socket);
-      if (String(data).startsWith("no ")) this.#events.refused(String(data).slice(3, 200));
+      const [word, , press, stops] = String(data).split(" ", 4);
+      if (word === "ok") this.#events.taken(press, Number(stops));
+      if (word === "no") this.#events.refused(String(data).slice(3, 200));
     });
     socket.addEventListener("close", () => socket === this.#socket && this.#retry());
   }

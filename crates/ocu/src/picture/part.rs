@@ -64,6 +64,8 @@ pub(crate) struct Part {
     pub(super) heard: Option<Instant>,
     /// Whether the last subscription event was a loss of reports.
     pub(super) is_down: bool,
+    /// Whether it was told to end an emergency: one that it reports may be over as soon as it hears that.
+    pub(super) is_clearing: bool,
 }
 
 impl Part {
@@ -85,6 +87,7 @@ impl Part {
             velocity_age: SampleAge::default(),
             heard: None,
             is_down: false,
+            is_clearing: false,
         }
     }
 

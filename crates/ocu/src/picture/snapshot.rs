@@ -66,7 +66,10 @@ impl Picture {
         (held, requested, stop_set): (bool, bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
-        let status = principal.and_then(|part| part.status);
+        // What a part reports that was told to end an emergency may be older than the stop.
+        let is_doubtful = |part: &Part| stop_set && part.is_clearing;
+        let status = principal.filter(|part| !is_doubtful(part));
+        let status = status.and_then(|part| part.status);
         let presence = match principal {
             None if self.is_empty() => "unknown",
             None => "gone",

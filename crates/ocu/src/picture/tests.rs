@@ -405,6 +405,39 @@ fn an_emergency_does_not_count_as_a_stop_before_the_speed_is_measured() {
 }
 
 #[test]
+fn an_emergency_of_a_part_that_was_told_to_end_it_confirms_a_new_stop_only_after_its_answer() {
+    let start = Instant::now();
+    let report = |state: State| ReportStatus {
+        status: (state as u8).into(),
+        ..ReportStatus::default()
+    };
+    let mut picture = picture(start, &[driver()]);
+    picture.handle_report(start, DRIVER, report(State::Emergency).into());
+    let is_confirmed = |picture: &Picture| {
+        let fleet = picture.fleet_state(start, String::new(), (false, false, true));
+        let shown = picture.vehicle_state(start, (true, false), |_| None);
+        let shown = shown.unwrap().emergency;
+        assert_eq!(shown, fleet.state == Some("emergency"));
+        assert_eq!(shown, picture.not_in_emergency(start).next().is_none());
+        shown
+    };
+    assert!(is_confirmed(&picture));
+    picture.handle_clearing(DRIVER);
+    picture.handle_report(start, DRIVER, report(State::Emergency).into());
+    assert!(
+        !is_confirmed(&picture),
+        "it may have reported before it heard"
+    );
+    picture.handle_stopped(DRIVER);
+    assert!(is_confirmed(&picture));
+    picture.handle_clearing(DRIVER);
+    picture.handle_report(start, DRIVER, report(State::Standby).into());
+    assert!(!is_confirmed(&picture));
+    picture.handle_report(start, DRIVER, report(State::Emergency).into());
+    assert!(is_confirmed(&picture), "the one before has ended");
+}
+
+#[test]
 fn a_vehicle_that_keeps_moving_in_emergency_is_a_runaway_while_its_speed_is_known() {
     let start = Instant::now();
     let mut picture = picture(start, &[driver(), sensors()]);

@@ -375,7 +375,16 @@ impl Reader<'_> {
                 (_, Some(vehicle)) => StopTarget::Vehicle(vehicle),
                 (_, None) => StopTarget::OfPage(self.page),
             };
-            let reply = StopReply::Confirmed(reply);
+            let answers = self.answers.clone();
+            let reply = StopReply {
+                taken: Box::new(move |taken| {
+                    let count = taken.ok().and_then(|it| it.count);
+                    if let Some((press, stops)) = press.zip(count) {
+                        say(&answers, &Answer::Stopped { press, stops });
+                    }
+                }),
+                confirmed: Some(reply),
+            };
             let user = Arc::clone(&self.visitor.user);
             let order = StopOrder {
                 target,

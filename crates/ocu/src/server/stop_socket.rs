@@ -3,8 +3,9 @@
 //!
 //! A page sends `stop SUBSYSTEM PRESS` or `stop-all PRESS`, and repeats it until the vehicles have
 //! confirmed the emergency. The [press](crate::press), which may be left out, tells copies from new
-//! stops. The answer is `ok SUBSYSTEM` or `ok all` when the emergency has been sent to the vehicle, or
-//! `no REASON`. Where reading requires the token, `token TOKEN` comes first. The station sends an empty
+//! stops. The answer is `ok SUBSYSTEM PRESS COUNT` or `ok all PRESS COUNT` when the emergency has been
+//! sent to the vehicle, or `no REASON`. The count is that of all stops that the station had taken then: a state
+//! that names a lower one was made before. Where reading requires the token, `token TOKEN` comes first. The station sends an empty
 //! frame every 10 s.
 
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use super::Shared;
 use super::bounds::{Bucket, FRAMES};
 use super::socket::{Parting, supervise};
 use super::visitor::Visitor;
-use crate::orders::{StopOrder, StopReply, StopTarget};
+use crate::orders::{StopOrder, StopReply, StopTarget, TakenStop};
 use crate::press::Press;
 use crate::request::OperatorRequest;
 use crate::users::UserRole;
@@ -135,7 +136,7 @@ impl<'s> Stops<'s> {
             target: vehicle.map_or(StopTarget::All, StopTarget::Vehicle),
             press,
             user: Arc::clone(&self.visitor.user),
-            reply: self.reply(vehicle),
+            reply: self.reply(vehicle, press),
         };
         // On error the session has ended, and the connection with it.
         let _ = self.shared.access.stops.send(order).await;
@@ -143,31 +144,44 @@ impl<'s> Stops<'s> {
     }
 
     /// The callback that answers and records a stop. A repetition is not recorded.
-    fn reply(&self, vehicle: Option<u16>) -> StopReply {
+    fn reply(&self, vehicle: Option<u16>, press: Option<Press>) -> StopReply {
         let answers = self.answers.clone();
         let trail = self.shared.admission.trail.clone();
         let (user, address) = (self.visitor.user.clone(), self.visitor.address);
-        StopReply::Taken(Box::new(move |result| {
+        let taken = move |result: Result<TakenStop, &str>| {
             let request = match vehicle {
                 Some(_) => OperatorRequest::Emergency { on: true },
                 None => OperatorRequest::EmergencyAll { on: true },
             };
-            let answer = match (&result, vehicle) {
-                (Ok(_), Some(vehicle)) => format!("ok {vehicle}"),
-                (Ok(_), None) => "ok all".to_owned(),
-                (Err(why), _) => format!("no {why}"),
+            let answer = match result {
+                Ok(taken) => in_words(vehicle, press.zip(taken.count)),
+                Err(why) => format!("no {why}"),
             };
-            if !matches!(result, Ok(false)) {
-                trail.request((&user, address), vehicle, &request, &result.map(|_| ()));
+            if result.map_or(true, |it| it.is_new) {
+                let result = result.map(|_| ()).map_err(str::to_owned);
+                trail.request((&user, address), vehicle, &request, &result);
             }
             // A full queue means that the page has not read the answers before.
             let _ = answers.try_send(answer);
-        }))
+        };
+        StopReply {
+            taken: Box::new(taken),
+            confirmed: None,
+        }
     }
 
     fn answer(&self, answer: String) {
         let _ = self.answers.try_send(answer);
     }
+}
+
+/// The answer to a stop of a vehicle, or of all, with its press and the number of stops.
+fn in_words(vehicle: Option<u16>, taken: Option<(Press, u64)>) -> String {
+    let target = vehicle.map_or_else(|| "all".to_owned(), |it| it.to_string());
+    taken.map_or_else(
+        || format!("ok {target}"),
+        |(press, count)| format!("ok {target} {press} {count}"),
+    )
 }
 
 /// The vehicle of a stop, `None` for all, and the press.

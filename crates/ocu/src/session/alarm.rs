@@ -1,8 +1,10 @@
 //! Emergency: sent to every part of the vehicle immediately and repeatedly until its status
 //! confirms the stop. Parts that restart meanwhile receive it as well.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+
+use tokio::task::AbortHandle;
 
 use super::client::{AlarmChange, Cleared, Client};
 use crate::orders::Reply;
@@ -20,7 +22,7 @@ pub(super) struct Alarm {
     /// Until when clearing is repeated, and whose emergency.
     clearing: Option<(Instant, Cleared)>,
     /// Parts with a delivery in progress.
-    busy: BTreeSet<JausId>,
+    busy: BTreeMap<JausId, AbortHandle>,
     waiting: Vec<Waiting>,
 }
 
@@ -47,7 +49,7 @@ impl Alarm {
 
     /// Sets the emergency, and sends it at once. Returns whether it is new. May be repeated at any
     /// rate.
-    pub(super) fn set(&mut self, now: Instant, picture: &Picture, client: &mut Client) -> bool {
+    pub(super) fn set(&mut self, now: Instant, picture: &mut Picture, client: &mut Client) -> bool {
         let is_new = !self.wanted;
         if is_new {
             tracing::info!("emergency: stopping vehicle {}", picture.vehicle());
@@ -55,7 +57,11 @@ impl Alarm {
             self.shouted = None;
         }
         self.wanted = true;
-        self.clearing = None;
+        if self.clearing.take().is_some() {
+            // What is still being told would undo the stop.
+            self.busy.values().for_each(AbortHandle::abort);
+            self.busy.clear();
+        }
         self.handle_time(now, picture, client);
         is_new
     }
@@ -70,7 +76,7 @@ impl Alarm {
         &mut self,
         now: Instant,
         whose: Cleared,
-        picture: &Picture,
+        picture: &mut Picture,
         client: &mut Client,
     ) {
         if self.wanted {
@@ -118,7 +124,7 @@ impl Alarm {
     }
 
     /// Starts the pending deliveries and answers waiting requesters.
-    pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
+    pub(super) fn handle_time(&mut self, now: Instant, picture: &mut Picture, client: &mut Client) {
         if self.wanted {
             self.shout(now, picture, client);
         }
@@ -129,9 +135,13 @@ impl Alarm {
             None => return self.answer(now, picture),
         };
         for part in left {
-            if self.busy.insert(part) {
-                client.alarm(part, change);
+            if self.busy.contains_key(&part) {
+                continue;
             }
+            if matches!(change, AlarmChange::Clear(_)) {
+                picture.handle_clearing(part);
+            }
+            self.busy.insert(part, client.alarm(part, change));
         }
         self.answer(now, picture);
     }

@@ -48,6 +48,7 @@ pub(super) enum Finished {
     /// A part received the start or the end of an emergency, with its status afterwards.
     Alarmed {
         peer: JausId,
+        change: AlarmChange,
         status: Option<ReportStatus>,
     },
 }
@@ -187,7 +188,7 @@ impl Client {
     }
 
     /// Sends the start or the end of an emergency to a part, then queries its status.
-    pub(super) fn alarm(&mut self, peer: JausId, change: AlarmChange) {
+    pub(super) fn alarm(&mut self, peer: JausId, change: AlarmChange) -> AbortHandle {
         let component = self.component.clone();
         self.jobs.spawn(async move {
             let deed = async {
@@ -198,8 +199,12 @@ impl Client {
             let status = component.query(peer, &QueryStatus {});
             let status = timeout(ALARM_PATIENCE, status).await;
             let status = status.ok().and_then(Result::ok);
-            Finished::Alarmed { peer, status }
-        });
+            Finished::Alarmed {
+                peer,
+                change,
+                status,
+            }
+        })
     }
 
     /// Sends an emergency without waiting for an acknowledgement.

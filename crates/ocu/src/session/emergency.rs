@@ -32,12 +32,14 @@ impl Session {
             StopTarget::Vehicle(number) => (false, Some(number)),
             StopTarget::All => (true, None),
         };
-        let is_meant = all || number.is_some();
-        if is_meant && !self.presses.take(press, number) {
-            return reply.ignored();
+        if !all && number.is_none() {
+            return reply.refused(NO_VEHICLE);
         }
+        let Some(count) = self.presses.take(press, number) else {
+            return reply.ignored();
+        };
         if all {
-            self.stop_all(now, reply);
+            self.stop_all(now, count, reply);
             return self.note_emergency_of_all(now, &user, true);
         }
         self.note_emergency(now, number, &user, true);
@@ -46,15 +48,16 @@ impl Session {
             return reply.refused(NO_VEHICLE);
         };
         let is_new = vehicle.set_emergency(now, &mut self.client);
-        match reply {
-            reply if !vehicle.has_managed() => reply.refused(NO_PARTS),
-            StopReply::Taken(taken) => taken(Ok(is_new)),
-            StopReply::Confirmed(reply) => vehicle.await_emergency(now, true, reply),
+        if !vehicle.has_managed() {
+            return reply.refused(NO_PARTS);
+        }
+        if let Some(confirmed) = reply.taken(is_new, count) {
+            vehicle.await_emergency(now, true, confirmed);
         }
     }
 
     /// Stops all vehicles, also those that appear later, and those of which no part is known yet.
-    fn stop_all(&mut self, now: Instant, reply: StopReply) {
+    fn stop_all(&mut self, now: Instant, count: u64, reply: StopReply) {
         let is_new = !self.all_stopped;
         self.all_stopped = true;
         let mut stopped = Vec::new();
@@ -64,12 +67,10 @@ impl Session {
                 stopped.push(vehicle);
             }
         }
-        match reply {
-            StopReply::Taken(taken) => taken(Ok(is_new)),
-            StopReply::Confirmed(reply) if stopped.is_empty() => reply(Err(NO_PARTS.to_owned())),
-            StopReply::Confirmed(reply) => {
-                await_all(now, true, stopped, &mut self.client, reply);
-            }
+        match reply.taken(is_new, count) {
+            Some(confirmed) if stopped.is_empty() => confirmed(Err(NO_PARTS.to_owned())),
+            Some(confirmed) => await_all(now, true, stopped, &mut self.client, confirmed),
+            None => {}
         }
         if is_new {
             self.publish_fleet(now);
@@ -180,14 +181,14 @@ impl Vehicle {
 
     /// Sets the emergency, and ends manual drive. Returns whether it is new.
     fn set_emergency(&mut self, now: Instant, client: &mut Client) -> bool {
-        let is_new = self.alarm.set(now, &self.picture, client);
+        let is_new = self.alarm.set(now, &mut self.picture, client);
         self.stop_driving(now, client);
         self.lease.set_ready(false);
         is_new
     }
 
     fn clear_emergency(&mut self, now: Instant, whose: Cleared, client: &mut Client) {
-        self.alarm.clear(now, whose, &self.picture, client);
+        self.alarm.clear(now, whose, &mut self.picture, client);
     }
 
     fn await_emergency(&mut self, now: Instant, on: bool, reply: Reply) {

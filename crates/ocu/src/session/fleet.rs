@@ -155,12 +155,13 @@ impl Fleet {
         });
     }
 
-    /// The list of vehicles.
-    pub(super) fn state(&self, now: Instant, all_stopped: bool) -> state::Fleet {
+    /// The list of vehicles, with whether all are to be stopped, and the number of stops taken.
+    pub(super) fn state(&self, now: Instant, (all_stopped, stops): (bool, u64)) -> state::Fleet {
         let vehicles = self.vehicles.values();
         state::Fleet {
             vehicles: vehicles.map(|it| it.fleet_state(now)).collect(),
             all_stopped,
+            stops,
         }
     }
 

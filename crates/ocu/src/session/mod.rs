@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
-use self::client::{Client, Finished};
+use self::client::{AlarmChange, Client, Finished};
 use self::fleet::Fleet;
 use super::answer::Said;
 use super::events::EventLog;
@@ -191,10 +191,17 @@ impl Session {
                     vehicle.maps.handle_mapped(edition, &result);
                 }
             }
-            Finished::Alarmed { peer, status } => {
+            Finished::Alarmed {
+                peer,
+                change,
+                status,
+            } => {
                 if let Some(vehicle) = self.fleet.get_mut(peer.subsystem()) {
                     vehicle.alarm.handle_told(peer);
                     if let Some(report) = status {
+                        if change == AlarmChange::Set {
+                            vehicle.picture.handle_stopped(peer);
+                        }
                         vehicle.handle_report(now, peer, report.into());
                     }
                 }
@@ -243,7 +250,8 @@ impl Session {
     }
 
     fn publish_fleet(&mut self, now: Instant) {
-        let fleet = self.fleet.state(now, self.all_stopped);
+        let stops = (self.all_stopped, self.presses.count());
+        let fleet = self.fleet.state(now, stops);
         self.publisher.fleet(&Said::Fleet(&fleet));
         let tree = self.fleet.tree(now);
         if self.published.as_ref() != Some(&tree) {

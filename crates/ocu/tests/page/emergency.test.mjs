@@ -31,6 +31,7 @@ Object.assign(globalThis, {
 Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });
 
 const { Emergency } = await import("../../src/page/emergency.js");
+const { Fleet } = await import("../../src/page/fleet.js");
 
 const clears = { clears: true, clearsAny: false };
 
@@ -50,6 +51,7 @@ function page({ vehicle = 101, barred = "" } = {}) {
     },
   });
   const emergency = new Emergency(link, () => unbarred.push(1));
+  const fleet = new Fleet(() => {});
   link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
   const state = (changes, stops) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes }, stops });
   const update = (shown) => emergency.update(shown, true, { vehicles: [], allStopped: false }, barred, clears);
@@ -60,6 +62,11 @@ function page({ vehicle = 101, barred = "" } = {}) {
     unbarred,
     asked,
     update: () => update(null),
+    /** The station says that it has taken what was pressed last, and how many stops that were. */
+    take: (stops) => {
+      const press = Socket.all.flatMap(({ sent }) => sent).at(-1).split(" ").at(-1);
+      Socket.all[0].dispatchEvent(Object.assign(new Event("message"), { data: `ok 101 ${press} ${stops}` }));
+    },
     /** A state arrives. */
     hear: (changes, stops = 0) => {
       const detail = state(changes, stops);
@@ -67,7 +74,10 @@ function page({ vehicle = 101, barred = "" } = {}) {
       update(detail);
     },
     /** A list of vehicles arrives. */
-    hearFleet: (vehicles, allStopped = false) => emergency.handleFleet({ vehicles, allStopped }),
+    hearFleet: (vehicles, stops, all_stopped = false) => {
+      fleet.handle({ vehicles, all_stopped, stops });
+      emergency.handleFleet(fleet);
+    },
     answer: async (reason) => {
       answer(reason);
       await new Promise((resolve) => setImmediate(resolve));
@@ -91,14 +101,15 @@ test("a page that is barred sends its stop all the same, and asks for the token"
 });
 
 test("an emergency that others have set does not confirm the operator's own stop", () => {
-  const { emergency, hear, repeated } = page();
+  const { emergency, hear, take, repeated } = page();
   hear({ emergency: true });
   emergency.stop();
-  hear({ emergency: true });
+  take(1);
+  hear({ emergency: true }, 1);
   assert.deepEqual(repeated(), ["stop 101"]);
-  hear({ emergency: false, stop_set: true });
+  hear({ emergency: false, stop_set: true }, 1);
   assert.deepEqual(repeated(), ["stop 101"], "the vehicle has not confirmed it");
-  hear({ emergency: true, stop_set: true });
+  hear({ emergency: true, stop_set: true }, 1);
   assert.deepEqual(repeated(), []);
 });
 
@@ -110,15 +121,45 @@ test("an old picture confirms nothing", () => {
   assert.deepEqual(repeated(), ["stop 101"]);
 });
 
+test("what was said before the station had a stop does not confirm it, however late it arrives", () => {
+  const { emergency, hear, hearFleet, take, repeated } = page();
+  // Other pages have stopped and cleared this vehicle meanwhile, of which this page has not heard yet.
+  emergency.stop();
+  take(5);
+  const stopped = [{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }];
+  for (const stops of [3, 4]) {
+    hear({ emergency: true, stop_set: true }, stops);
+    hearFleet(stopped, stops, true);
+    assert.deepEqual(repeated(), ["stop 101"]);
+  }
+  hearFleet(stopped, 5);
+  assert.deepEqual(repeated(), []);
+});
+
+test("a stop is confirmed only once the station has said which of all it was, and after a new connection again", () => {
+  const { link, emergency, hear, take, repeated } = page();
+  emergency.stop();
+  hear({ emergency: true, stop_set: true }, 9);
+  assert.deepEqual(repeated(), ["stop 101"]);
+  take(2);
+  link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
+  hear({ emergency: true, stop_set: true }, 9);
+  assert.deepEqual(repeated(), ["stop 101"], "perhaps another station, which counts from the start");
+  take(1);
+  hear({ emergency: true, stop_set: true }, 1);
+  assert.deepEqual(repeated(), []);
+});
+
 test("a stop after one's own clearing outlives it", async () => {
-  const { emergency, hear, answer, repeated } = page();
-  hear({ emergency: true, stop_set: true });
+  const { emergency, hear, take, answer, repeated } = page();
+  hear({ emergency: true, stop_set: true }, 1);
   get("clear-yes").click();
   emergency.stop();
-  hear({ emergency: true, stop_set: true });
+  hear({ emergency: true, stop_set: true }, 1);
   assert.deepEqual(repeated(), ["stop 101"], "the clearing is still under way");
   await answer(null);
-  hear({ emergency: false });
+  take(2);
+  hear({ emergency: false }, 2);
   assert.deepEqual(repeated(), ["stop 101"]);
 });
 
@@ -130,14 +171,16 @@ test("clearing ends the repetitions of an earlier stop", () => {
 });
 
 test("each vehicle is stopped for itself, whichever the page shows", () => {
-  const { link, emergency, hear, hearFleet, repeated } = page();
+  const { link, emergency, hear, hearFleet, take, repeated } = page();
   emergency.stop();
+  take(1);
   link.vehicle = 102;
-  hear({ subsystem: 102, emergency: true, stop_set: true });
+  hear({ subsystem: 102, emergency: true, stop_set: true }, 1);
   assert.deepEqual(repeated(), ["stop 101"]);
   emergency.stop();
+  take(2);
   assert.deepEqual(repeated(), ["stop 101", "stop 102"]);
-  hearFleet([{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }]);
+  hearFleet([{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }], 2);
   assert.deepEqual(repeated(), ["stop 102"]);
 });
 
@@ -151,20 +194,21 @@ test("a stop that was pressed before the page knew a vehicle is sent when it doe
 });
 
 test("a stop of all is confirmed by the latch and the station's stop of each, and not by vehicles that are already stopped", () => {
-  const { emergency, hearFleet, repeated } = page();
+  const { emergency, hearFleet, take, repeated } = page();
   const known = (isSet) => [
     { subsystem: 101, state: "emergency", presence: "present" },
     { subsystem: 102, state: "ready", presence: "silent", stop_set: isSet },
     { subsystem: 103, state: null, presence: "gone" },
   ];
   emergency.stopAll();
-  hearFleet(known(true));
-  hearFleet([]);
+  take(1);
+  hearFleet(known(true), 1);
+  hearFleet([], 1);
   assert.deepEqual(repeated(), ["stop-all"]);
   // Somebody has cleared the silent one since all were stopped the last time.
-  hearFleet(known(false), true);
+  hearFleet(known(false), 1, true);
   assert.deepEqual(repeated(), ["stop-all"]);
-  hearFleet(known(true), true);
+  hearFleet(known(true), 1, true);
   assert.deepEqual(repeated(), []);
 });
 
@@ -215,11 +259,12 @@ test("who clears a stop says which stops the shown state knows of, and none of a
 });
 
 test("a key whose first press the page did not see stops by its repeats", () => {
-  const { emergency, hear, repeated } = page();
+  const { emergency, hear, take, repeated } = page();
   const key = { key: "Escape", target: {}, repeat: true, preventDefault() {} };
   assert.ok(emergency.key(key));
   assert.deepEqual(repeated(), ["stop 101"]);
-  hear({ emergency: true, stop_set: true });
+  take(1);
+  hear({ emergency: true, stop_set: true }, 1);
   emergency.key(key);
   assert.deepEqual(repeated(), [], "it is done");
 });

@@ -30,7 +30,7 @@ function rig(token = "") {
   mock.timers.enable({ apis: ["setTimeout"] });
   const sockets = [];
   const requests = [];
-  const link = { token, send: (request) => requests.push(request.type) };
+  const link = Object.assign(new EventTarget(), { token, send: (request) => requests.push(request.type) });
   const stops = new StopLink(link, () => {
     sockets.push(new Socket());
     return sockets.at(-1);
@@ -38,7 +38,7 @@ function rig(token = "") {
   stops.start();
   /** What was sent, without the presses. */
   const sent = () => sockets.map(({ sent }) => sent.splice(0).map((frame) => frame.replace(PRESS, "")));
-  return { stops, sockets, requests, sent };
+  return { link, stops, sockets, requests, sent };
 }
 
 const PRESS = / \d+\.\d+$/;
@@ -77,6 +77,36 @@ test("copies of a stop carry its press, and the next stop has another one", () =
   assert.deepEqual(second, [stops.press.join(".")]);
   assert.notDeepEqual(first, second);
   assert.ok(`stop 65535 ${2 ** 32 - 1}.${2 ** 32 - 1}`.length <= 32, "the station takes no longer frame");
+});
+
+test("a stop is confirmed by what the station said no sooner than it had taken this press, on whichever connection", () => {
+  const { link, stops, sockets } = rig();
+  sockets[0].open();
+  stops.stop(101);
+  const [page, number] = stops.press;
+  stops.confirm(101, 1_000);
+  assert.ok(stops.wants(101), "not taken yet");
+  for (const answer of ["ok 101", `ok 101 ${page}.${number}`, `ok 101 ${page}.${number} many`, `ok 101 1.${number} 0`]) {
+    sockets[0].say(answer);
+    stops.confirm(101, 1_000);
+    assert.ok(stops.wants(101), answer);
+  }
+  sockets[0].say(`ok 101 ${page}.${number} 8`);
+  for (const stops_said of [7, null, undefined, NaN, "9"]) stops.confirm(101, stops_said);
+  assert.ok(stops.wants(101));
+  stops.confirm(101, 8);
+  assert.ok(!stops.wants(101));
+  stops.stop(101);
+  sockets[0].say(`ok 101 ${page}.${number} 8`);
+  stops.confirm(101, 8);
+  assert.ok(stops.wants(101), "a late answer to the press before");
+  const heard = (press, stops) => link.dispatchEvent(new CustomEvent("stopped", { detail: { press, stops } }));
+  for (const wrong of [undefined, null, 7, "7.1", []]) heard(wrong, 9);
+  stops.confirm(101, 9);
+  assert.ok(stops.wants(101));
+  heard(stops.press, 9);
+  stops.confirm(101, 9);
+  assert.ok(!stops.wants(101));
 });
 
 test("without a connection of its own, a stop takes the other one and the next that opens", () => {
