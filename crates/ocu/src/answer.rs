@@ -1,10 +1,11 @@
 //! Messages from the station to a page.
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::page_link::PageLinkQuality;
 use super::press::Press;
-use super::state::{Fleet, Overlay, State, Tree};
+use super::state::{Fleet, Overlay, Tree};
 
 /// One frame to a page.
 #[derive(Debug, Serialize)]
@@ -26,7 +27,9 @@ pub(super) enum Said<'a> {
         /// Whether the station has a map file.
         base_map: bool,
     },
-    State(&'a State),
+    /// What has changed in the state of the page's vehicle since the last frame of this kind: all of it in the first
+    /// one of a connection.
+    State(&'a Map<String, Value>),
     Fleet(&'a Fleet),
     Tree(&'a Tree),
     /// The links from page to station and from station to vehicle, once a second.
@@ -46,7 +49,7 @@ pub(super) enum Said<'a> {
     /// A stop was taken and sent.
     Stopped {
         press: Press,
-        /// How many stops of all pages the station had taken with it, as in [`State`].
+        /// How many stops of all pages the station had taken with it, as in [`State`](super::state::State).
         stops: u64,
     },
     /// A request succeeded.

@@ -8,6 +8,7 @@
 
 mod answer;
 mod base_map;
+mod changes;
 mod events;
 #[expect(clippy::disallowed_methods, reason = "the subscriptions' delays")]
 mod following;

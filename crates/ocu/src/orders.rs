@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::answer::Said;
@@ -13,7 +14,7 @@ use super::ownership::{Owner, PageId};
 use super::page_link::TooOld;
 use super::press::{KnownStops, Press};
 use super::request::OperatorRequest;
-use super::state::{Events, Overlay};
+use super::state::{Events, Overlay, State};
 use super::token::Token;
 use super::vehicle_link::VehicleLinkQuality;
 
@@ -174,8 +175,8 @@ pub(super) struct Snapshot {
     pub(super) seq: u64,
     pub(super) vehicle: Option<u16>,
     pub(super) link: VehicleLinkQuality,
-    /// The snapshot as JSON; empty before the first.
-    pub(super) json: Arc<str>,
+    /// The fields of the snapshot; none before the first.
+    pub(super) fields: Arc<Map<String, Value>>,
 }
 
 /// The last snapshots that are the same for all pages, as JSON; empty before the first.
@@ -235,6 +236,15 @@ impl Publisher {
 
     pub(super) fn tree(&self, tree: &Said<'_>) {
         self.tree.send_replace(json(tree));
+    }
+}
+
+/// The fields of a snapshot.
+pub(super) fn fields(state: &State) -> Map<String, Value> {
+    match serde_json::to_value(state) {
+        Ok(Value::Object(fields)) => fields,
+        // Serialisation cannot fail for numbers and text, and a structure is an object.
+        _ => Map::new(),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Snapshot of the vehicle that a page has selected.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -224,10 +224,13 @@ pub struct Zone {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
     /// Metres north; `null` if unknown.
+    #[serde(serialize_with = "rounded")]
     pub x: Option<f64>,
     /// Metres east; `null` if unknown.
+    #[serde(serialize_with = "rounded")]
     pub y: Option<f64>,
     /// Radians clockwise from north; `null` if unknown.
+    #[serde(serialize_with = "rounded")]
     pub yaw: Option<f64>,
     /// Milliseconds since the sample was taken according to its time stamp, or since the report
     /// arrived without a stamp.
@@ -268,8 +271,10 @@ pub struct Fix {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Velocity {
     /// Forward speed in metres per second; `null` if unknown.
+    #[serde(serialize_with = "rounded")]
     pub x: Option<f64>,
     /// Clockwise yaw rate in radians per second; `null` if unknown.
+    #[serde(serialize_with = "rounded")]
     pub yaw_rate: Option<f64>,
     /// Age of the sample in milliseconds, as for the pose.
     pub age_ms: u64,
@@ -286,8 +291,6 @@ pub struct Part {
     pub managed: bool,
     /// Management state, for example `ready`.
     pub state: Option<&'static str>,
-    /// Milliseconds since that state was reported.
-    pub state_age_ms: Option<u64>,
     /// JAUS id of the client in control.
     pub controller: Option<String>,
     /// Authority of that client.
@@ -298,8 +301,6 @@ pub struct Part {
     pub obstacle: Option<String>,
     /// State of its stage of the mission.
     pub stage: Option<Stage>,
-    /// Milliseconds since its last report.
-    pub age_ms: Option<u64>,
 }
 
 /// A component of the vehicle that has disappeared or fallen silent.
@@ -478,6 +479,13 @@ impl Map {
     pub(crate) const fn edition(&self) -> Edition {
         (self.id, self.revision)
     }
+}
+
+/// Writes metres and radians to four decimals: finer ones are noise, by which a vehicle at rest would seem to move.
+fn rounded<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    value
+        .map(|it| (it * 1e4).round() / 1e4)
+        .serialize(serializer)
 }
 
 /// Milliseconds since `then`.

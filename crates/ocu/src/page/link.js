@@ -1,6 +1,7 @@
 // The connection to jaus-ocu: opens the WebSocket, opens it again with growing pauses, carries
 // setpoints, requests and their answers, and knows how old the last state is.
 
+import { changed } from "./changes.js";
 import { number, plain } from "./dom.js";
 import { Flow } from "./flow.js";
 
@@ -39,6 +40,8 @@ export class Link extends EventTarget {
   /** What the station has told this page alone: it shows that to replace its connection. */
   #secret = "";
   #quality = null;
+  /** The last state of this connection. Each says what has changed. */
+  #state = null;
   #flow = new Flow((frame) => this.#transmit(frame));
   /** Resolves to whether the page may connect. */
   #admit;
@@ -217,6 +220,7 @@ export class Link extends EventTarget {
     if (frame === null || typeof frame !== "object") return;
     switch (frame.type) {
       case "hello":
+        this.#state = null;
         this.#page = number(frame.page);
         this.#secret = plain(frame.secret, 64);
         this.#flow.reset();
@@ -224,6 +228,7 @@ export class Link extends EventTarget {
         this.#emit("hello", frame);
         break;
       case "state":
+        frame = this.#state = changed(this.#state, frame);
         this.#stateAt = performance.now();
         this.#pause = FIRST_PAUSE;
         this.#retryAt = 0;

@@ -41,6 +41,7 @@ pub(crate) const FILES: &[File] = files! {
     "/main.js" SCRIPT "main.js",
     "/account.js" SCRIPT "account.js",
     "/dom.js" SCRIPT "dom.js",
+    "/changes.js" SCRIPT "changes.js",
     "/flow.js" SCRIPT "flow.js",
     "/link.js" SCRIPT "link.js",
     "/stop_link.js" SCRIPT "stop_link.js",

@@ -28,8 +28,7 @@ impl Picture {
         }
         let mut parts: Vec<_> = self.parts.iter().collect();
         parts.sort_by_key(|(id, part)| (part.role, **id));
-        let describe =
-            |(id, part): (&JausId, &Part)| self.part_state(now, *id, part, obstacle(*id));
+        let describe = |(id, part): (&JausId, &Part)| self.part_state(*id, part, obstacle(*id));
         let any = self.in_emergency().next().is_some();
         let all = any && self.not_in_emergency(now).next().is_none();
         Some(state::VehicleState {
@@ -100,26 +99,18 @@ impl Picture {
         }
     }
 
-    fn part_state(
-        &self,
-        now: Instant,
-        id: JausId,
-        part: &Part,
-        obstacle: Option<String>,
-    ) -> state::Part {
+    fn part_state(&self, id: JausId, part: &Part, obstacle: Option<String>) -> state::Part {
         let controller = part.controller.and_then(|known| known.what);
         state::Part {
             id: id.to_string(),
             role: part.role.name(),
             managed: part.managed,
             state: part.status.map(|known| state_name(known.what)),
-            state_age_ms: part.status.map(|known| age(now, known.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
             ours: controller.is_some_and(|(id, _)| id == self.own),
             obstacle,
             stage: part.stage.clone(),
-            age_ms: part.heard.map(|at| age(now, at)),
         }
     }
 

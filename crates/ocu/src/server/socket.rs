@@ -9,6 +9,7 @@ use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::Deserialize;
+use serde_json::{Map, Value};
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
@@ -17,6 +18,7 @@ use super::bounds::{Bucket, FRAMES};
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
 use crate::answer::Said as Answer;
+use crate::changes::changes;
 use crate::orders::{
     DriveOrder, OpenedPage, Order, ReplacedPage, Reply, Snapshot, StopOrder, StopReply, StopTarget,
     json,
@@ -31,7 +33,7 @@ use jaus::node::now;
 use jaus_view::Filter;
 
 /// Version of the protocol between page and station.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Limit of queued answers per page. Further answers are dropped.
 const ANSWERS: usize = 64;
 /// A page that accepts no data for this time is disconnected.
@@ -126,6 +128,7 @@ pub(super) async fn serve(
         visitor: &visitor,
         link: &link,
         snapshots,
+        said: Arc::default(),
     };
     let parting = tokio::select! {
         parting = reader.run(&mut stream) => parting,
@@ -493,6 +496,8 @@ struct Writer<'s> {
     visitor: &'s Visitor,
     link: &'s SharedLink,
     snapshots: watch::Receiver<Snapshot>,
+    /// The state that the page has.
+    said: Arc<Map<String, Value>>,
 }
 
 impl Writer<'_> {
@@ -591,15 +596,17 @@ impl Writer<'_> {
         }))
     }
 
-    /// The state of the page's vehicle; `None` before the first.
+    /// What has changed in the state of the page's vehicle; `None` before the first.
     fn state(&mut self) -> Option<Message> {
         let snapshot = self.snapshots.borrow_and_update();
-        if snapshot.json.is_empty() {
+        if snapshot.fields.is_empty() {
             return None;
         }
         let mut link = self.link.lock();
         link.handle_sent(now(), snapshot.seq, snapshot.vehicle);
-        Some(text(&snapshot.json))
+        let changed = changes(&self.said, &snapshot.fields);
+        self.said = Arc::clone(&snapshot.fields);
+        Some(text(&json(&Answer::State(&changed))))
     }
 
     fn links(&self) -> Message {

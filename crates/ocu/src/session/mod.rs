@@ -16,6 +16,7 @@ mod mission;
 mod observations;
 mod vehicle;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
@@ -27,7 +28,7 @@ use super::answer::Said;
 use super::events::EventLog;
 use super::following::Sighting;
 use super::handover::{self, Notice};
-use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, json};
+use super::orders::{Access, Order, Publisher, Snapshot, StopOrder, fields};
 use super::pages::Pages;
 use super::press::Presses;
 use super::state::{State, Tree};
@@ -267,7 +268,7 @@ impl Session {
             seq: state.seq,
             vehicle: number,
             link: vehicle.map(|it| it.link.quality()).unwrap_or_default(),
-            json: json(&Said::State(&state)),
+            fields: Arc::new(fields(&state)),
         }
     }
 

@@ -321,6 +321,25 @@ async fn a_page_gets_the_next_state_when_it_has_confirmed_the_last_and_learns_of
 }
 
 #[tokio::test]
+async fn a_state_says_what_has_changed_and_with_those_before_it_all_that_there_is() {
+    /// Octets of a state while a vehicle drives: a slow link carries stops and confirmations, too.
+    const SHORT: usize = 400;
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    for _ in 0..10 {
+        page.drive(0.5).await.unwrap();
+        page.state().await;
+        assert!(page.length < SHORT, "{} octets", page.length);
+    }
+    let mut other = scene.page().await;
+    let whole = other.state().await;
+    assert!(other.length > 2 * SHORT, "{} octets", other.length);
+    let same = page.until(|state| state["seq"].as_u64() >= whole["seq"].as_u64());
+    assert_eq!(same.await, whole);
+}
+
+#[tokio::test]
 async fn an_emergency_of_one_station_is_cleared_by_no_other() {
     let scene = Scene::new().await;
     let _driver = scene.driver().await;

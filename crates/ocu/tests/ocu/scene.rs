@@ -341,6 +341,10 @@ pub(crate) struct Page {
     last_id: u64,
     /// Number of the last state, and when it was read.
     seen: Option<(u64, Instant)>,
+    /// The last state, with all that was said before it.
+    state: Value,
+    /// The length of the last frame in octets.
+    pub(crate) length: usize,
 }
 
 impl Page {
@@ -379,6 +383,8 @@ impl Page {
             hello: Value::Null,
             last_id: 0,
             seen: None,
+            state: Value::Null,
+            length: 0,
         };
         page.hello = page.next().await;
         assert_eq!(page.hello["type"], "hello");
@@ -397,17 +403,24 @@ impl Page {
     }
 
     pub(crate) async fn next_unconfirmed(&mut self) -> Value {
-        loop {
+        let text = loop {
             match within_limit(self.socket.next())
                 .await
                 .expect("closed")
                 .unwrap()
             {
-                Message::Text(text) => return serde_json::from_str(&text).unwrap(),
+                Message::Text(text) => break text,
                 Message::Ping(_) => {}
                 other => panic!("{other:?}"),
             }
+        };
+        self.length = text.len();
+        let said: Value = serde_json::from_str(&text).unwrap();
+        if said["type"] != "state" {
+            return said;
         }
+        apply(&mut self.state, said);
+        self.state.clone()
     }
 
     /// A setpoint by the last state that was read.
@@ -532,6 +545,18 @@ impl Page {
 /// The primitive driver in a snapshot; null if it is unknown.
 pub(crate) fn driver_of(state: &Value) -> &Value {
     part_of(state, "primitive_driver")
+}
+
+/// Changes a state as a later one says.
+fn apply(state: &mut Value, changes: Value) {
+    match (state, changes) {
+        (Value::Object(state), Value::Object(changes)) => {
+            for (name, change) in changes {
+                apply(state.entry(name).or_insert(Value::Null), change);
+            }
+        }
+        (state, changes) => *state = changes,
+    }
 }
 
 /// The planner in a snapshot; null if it is unknown.
