@@ -8,7 +8,8 @@
 //! emergency). A command of an application's own service is compared with the stops alone, because
 //! it may concern something else than the one before.
 //!
-//! Stops are never checked: an old stop stops as well as a new one. Neither are messages from
+//! Stops are never checked: an old stop stops as well as a new one. What ends an emergency is: it may arrive
+//! after its client has set the next one, and must not end that. Neither are messages from
 //! components of the same node, which have no numbers and arrive in order, nor broadcasts, which are
 //! not retransmitted and which some peers count separately.
 //!
@@ -112,6 +113,11 @@ impl Mark {
         now.saturating_duration_since(self.at) < MEMORY
     }
 
+    /// Whether the sender has sent `other` before this, and a network or a retransmission has delayed it.
+    pub(super) fn is_after(self, other: Self) -> bool {
+        (1..=REACH).contains(&self.lead(other.at, other.number))
+    }
+
     /// How far `number` is ahead, on the circle.
     pub(super) const fn ahead(self, number: u16) -> u16 {
         number.wrapping_sub(self.number)
@@ -205,6 +211,14 @@ impl SendOrder {
         }
         Some(self.clients.entry(id).or_default())
     }
+}
+
+/// The mark of a message; `None` if it says nothing about the order.
+pub(super) fn mark_of(now: Instant, message: &Received) -> Option<Mark> {
+    Some(Mark {
+        number: number_of(message)?,
+        at: now,
+    })
 }
 
 /// The number that the sender gave a message; `None` if it says nothing about the order.

@@ -49,8 +49,9 @@ pub(super) enum Said<'a> {
     /// A stop was taken and sent.
     Stopped {
         press: Press,
-        /// How many stops of all pages the station had taken with it, as in [`State`](super::state::State).
-        stops: u64,
+        /// How many stops of all pages the station had taken with it, as in [`State`](super::state::State); `null` if
+        /// it was cleared since, so that the page need not repeat it.
+        stops: Option<u64>,
     },
     /// A request succeeded.
     Done {

@@ -127,7 +127,7 @@ pub(super) struct TakenStop {
     /// Whether it stops what was not stopped before.
     pub(super) is_new: bool,
     /// How many presses the station had taken with it: states that name as many or more are younger. `None` for a
-    /// late copy of a press that was cleared since, which stops nothing.
+    /// copy of a press that was cleared since, which stops nothing.
     pub(super) count: Option<u64>,
 }
 

@@ -44,6 +44,8 @@ pub(super) struct Picture {
     maps: Vec<state::Map>,
     store: Option<JausId>,
     stop_monitor: StopMonitor,
+    /// When this station last stopped the vehicle.
+    stopped: Option<Instant>,
     overlay: MapOverlay,
 }
 
@@ -61,6 +63,8 @@ impl Picture {
     const DRIVABLE: Duration = Duration::from_secs(1);
     /// A local pose of the same time as a global one is younger than this.
     const PAIR: Duration = Duration::from_millis(300);
+    /// What arrives after this time was said after the stop that was sent then.
+    const LONGEST_WAY: Duration = Duration::from_secs(2);
     /// A planner that is silent for this time while other parts report is lost.
     const LOST: Duration = Duration::from_secs(2);
 
@@ -84,6 +88,7 @@ impl Picture {
             maps: Vec::new(),
             store: None,
             stop_monitor: StopMonitor::default(),
+            stopped: None,
             overlay: MapOverlay::default(),
         }
     }
@@ -211,10 +216,7 @@ impl Picture {
         }
         (part.heard, part.is_down) = (Some(now), false);
         match report {
-            Report::Status(what) => {
-                part.status = Some(Sample { what, by, at: now });
-                part.is_clearing &= part.is(State::Emergency);
-            }
+            Report::Status(what) => part.status = Some(Sample { what, by, at: now }),
             Report::Control(what) => part.controller = Some(Sample { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
             Report::Pose(what, sampled) => {
@@ -373,31 +375,43 @@ impl Picture {
         is_lost.then_some((planner, Absence::Silent))
     }
 
-    /// A part is told to end its emergency.
-    pub(super) fn handle_clearing(&mut self, part: JausId) {
+    /// This station stops the vehicle.
+    pub(super) fn handle_stop(&mut self, now: Instant) {
+        self.stopped = Some(now);
+        let parts = self.parts.values_mut();
+        parts.for_each(|part| part.has_answered_stop = false);
+    }
+
+    /// A part has acknowledged the stop of this station, and reported its state after that.
+    pub(super) fn handle_stop_answered(&mut self, part: JausId) {
         if let Some(part) = self.parts.get_mut(&part) {
-            part.is_clearing = true;
+            part.has_answered_stop = true;
         }
     }
 
-    /// A part has answered after it was told to stop: what it reports from now on is its state after that.
-    pub(super) fn handle_stopped(&mut self, part: JausId) {
-        if let Some(part) = self.parts.get_mut(&part) {
-            part.is_clearing = false;
-        }
-    }
-
-    /// The parts that can enter emergency and have not recently reported it.
+    /// The parts that can enter emergency and have not recently reported that of this station's last stop.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
-            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < self.depth.fresh();
-            let is_recent = part.status.as_ref().is_some_and(fresh);
-            part.is(State::Emergency) && !part.is_clearing && is_recent
+            part.status.is_some_and(|status| {
+                let is_recent = now.saturating_duration_since(status.at) < self.depth.fresh();
+                // Some peers acknowledge nothing.
+                let is_later = self
+                    .stopped
+                    .is_none_or(|at| status.at >= at + Self::LONGEST_WAY);
+                let is_of_stop = part.has_answered_stop || is_later;
+                part.is(State::Emergency) && is_recent && is_of_stop
+            })
         };
         let managed = self.parts.iter().filter(|(_, part)| part.managed);
         managed
             .filter(move |(_, part)| !stands(part))
             .map(|(id, _)| *id)
+    }
+
+    /// Whether it reports an emergency: if this station has stopped it, whether every part has confirmed that.
+    fn is_in_emergency(&self, now: Instant, is_stopped: bool) -> bool {
+        let any = self.in_emergency().next().is_some();
+        any && !(is_stopped && self.not_in_emergency(now).next().is_some())
     }
 
     /// The parts in emergency.

@@ -1,9 +1,8 @@
 //! Presses of the emergency stop. A page repeats a stop over several connections until it is confirmed,
 //! and a network delivers late what it has lost before, on each connection for itself. So a copy of a stop
-//! may arrive after the same page has cleared it, and must not stop the vehicle again; and the request that
-//! clears a stop may arrive after the next press, and must not undo it, whichever page it came from. So
-//! the request says which stops its operator knows about. A late copy of a stop that another page has cleared does
-//! stop the vehicle again.
+//! may arrive after that was cleared, and must not stop the vehicle again; and the request that clears a stop
+//! may arrive after the next press, and must not undo it, whichever page it came from. So the request says
+//! which stops its operator knows about.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -57,7 +56,7 @@ pub(super) struct Presses {
     all: VecDeque<Pressed>,
     /// How many have been taken.
     count: u64,
-    /// The last one that is not listed any more, although its page has not cleared it.
+    /// The last one that is not listed any more, although it was not cleared.
     forgotten: u64,
 }
 
@@ -70,7 +69,7 @@ struct Pressed {
     vehicle: Option<u16>,
     /// The last press that has arrived.
     taken: u32,
-    /// The last press that its page has cleared, with those before it.
+    /// The last press that was cleared, with those before it.
     cleared: u32,
     /// How many presses the station had taken with the last one.
     count: u64,
@@ -81,7 +80,7 @@ impl Presses {
     const MOST: usize = 64;
 
     /// Notes a press for a vehicle, or for all. Returns how many presses have been taken with the last
-    /// one of this page; `None` if it does not count, because the page has cleared it.
+    /// one of this page; `None` if it does not count, because it was cleared.
     pub(super) fn take(&mut self, press: Option<Press>, vehicle: Option<u16>) -> Option<u64> {
         if press.is_some_and(|press| self.is_cleared(press, vehicle)) {
             return None;
@@ -99,7 +98,8 @@ impl Presses {
         Some(count)
     }
 
-    fn is_cleared(&self, press: Press, vehicle: Option<u16>) -> bool {
+    /// Whether a press was cleared for a vehicle, or for all.
+    pub(super) fn is_cleared(&self, press: Press, vehicle: Option<u16>) -> bool {
         self.all.iter().any(|it| {
             let is_meant = it.vehicle.is_none() || it.vehicle == vehicle;
             it.page == Some(press.0) && is_meant && press.1 <= it.cleared
@@ -123,22 +123,39 @@ impl Presses {
         let Press(page, last) = known.press;
         // What the station has not taken was counted by another one.
         let is_counted = |count| (self.forgotten..=self.count).contains(&count);
+        let is_meant =
+            |it: &Pressed| vehicle.is_none() || it.vehicle.is_none() || it.vehicle == vehicle;
         let is_pressed_since = self.all.iter().any(|it| {
-            let is_meant = vehicle.is_none() || it.vehicle.is_none() || it.vehicle == vehicle;
             let is_known = match it.page == Some(page) {
                 true => it.taken <= last,
                 false => {
                     known.count.is_none_or(|known| it.count <= known) || it.taken <= it.cleared
                 }
             };
-            is_meant && !is_known
+            is_meant(it) && !is_known
         });
         if is_pressed_since || !known.count.is_none_or(is_counted) {
             return Err(PressedSince);
         }
-        let entry = self.entry(Some(page), vehicle);
-        entry.cleared = entry.cleared.max(last);
+        let others = self.all.iter().filter(|it| is_meant(it));
+        let others = others.map(|it| (it.page, it.vehicle.or(vehicle), it.taken));
+        for (page, vehicle, last) in others.collect::<Vec<_>>() {
+            self.note_cleared(page, vehicle, last);
+        }
+        self.note_cleared(Some(page), vehicle, last);
         Ok(())
+    }
+
+    /// With the last emergency, the stops of all vehicles are cleared.
+    pub(super) fn clear_stops_of_all(&mut self) {
+        for entry in self.all.iter_mut().filter(|it| it.vehicle.is_none()) {
+            entry.cleared = entry.cleared.max(entry.taken);
+        }
+    }
+
+    fn note_cleared(&mut self, page: Option<u32>, vehicle: Option<u16>, last: u32) {
+        let entry = self.entry(page, vehicle);
+        entry.cleared = entry.cleared.max(last);
     }
 
     /// The entry of a page and a target, which is now the latest.
@@ -282,7 +299,27 @@ mod tests {
             );
             assert_eq!(presses.count() == now, press.is_some());
             assert_eq!(presses.clear(knows(presses.count()), cleared), Ok(()));
+            let is_cleared = press.map(|it| presses.is_cleared(it, cleared.or(stopped)));
+            assert_eq!(is_cleared, press.map(|_| !is_undone), "a copy");
         }
+    }
+
+    #[test]
+    fn a_stop_of_all_that_was_cleared_for_one_vehicle_holds_for_the_others() {
+        let mut presses = Presses::default();
+        let count = presses.take(Some(Press(7, 1)), None);
+        let known = KnownStops {
+            press: Press(8, 0),
+            count,
+        };
+        assert_eq!(presses.clear(known, Some(101)), Ok(()));
+        assert!(presses.take(Some(Press(7, 1)), None).is_some(), "a copy");
+        assert!(presses.is_cleared(Press(7, 1), Some(101)));
+        assert!(!presses.is_cleared(Press(7, 1), Some(102)));
+        assert!(!presses.is_cleared(Press(7, 2), Some(101)), "a new press");
+        presses.clear_stops_of_all();
+        assert!(presses.take(Some(Press(7, 1)), None).is_none());
+        assert!(presses.take(Some(Press(7, 2)), None).is_some());
     }
 
     #[test]

@@ -166,11 +166,13 @@ enum ShortFrame {
     Drive(u64, u64, f64, f64),
     Seen(u64, u64),
     Received((u64,)),
+    DriveEnd([u64; 0]),
 }
 
 impl Frame {
     /// Reads a frame. An array of numbers is the short form of the most frequent ones: `[seen]` of
-    /// `received`, `[seen, held_ms]` of `seen`, and `[seen, held_ms, forward, turn]` of `drive`.
+    /// `received`, `[seen, held_ms]` of `seen`, `[seen, held_ms, forward, turn]` of `drive`, and `[]` of
+    /// `drive_end`.
     ///
     /// # Errors
     /// If the text is no frame.
@@ -181,6 +183,7 @@ impl Frame {
         let said = match serde_json::from_str(text)? {
             ShortFrame::Received((seen,)) => Said::Received { seen },
             ShortFrame::Seen(seq, held_ms) => Said::Seen(Seen { seq, held_ms }),
+            ShortFrame::DriveEnd([]) => Said::OperatorRequest(OperatorRequest::DriveEnd),
             ShortFrame::Drive(seq, held_ms, forward, turn) => {
                 Said::OperatorRequest(OperatorRequest::Drive {
                     forward,
@@ -336,6 +339,7 @@ mod tests {
             ),
             (r#"{"type":"take_over"}"#, OperatorRequest::TakeOver),
             (r#"{"type":"drive_end"}"#, OperatorRequest::DriveEnd),
+            ("[]", OperatorRequest::DriveEnd),
             (
                 r#"{"type":"destination","x":1,"y":-2.5,"speed":null}"#,
                 OperatorRequest::Destination {
@@ -398,7 +402,7 @@ mod tests {
         for text in [
             "",
             "{}",
-            "[]",
+            "[[]]",
             r#"{"type":"fly"}"#,
             r#"{"type":"control"}"#,
             r#"{"type":"handover","part":"101.3.36","operator":"43","grant":true}"#,

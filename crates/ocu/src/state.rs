@@ -1,5 +1,6 @@
 //! Snapshots for pages: the vehicle of the page, the list of vehicles, and the tree of components. Each
-//! one is complete, so that a reconnecting page needs nothing else. Unknown values are `null`.
+//! one is complete, so that a reconnecting page needs nothing else; of the first kind a page then gets the
+//! [changes](super::changes). Unknown values are `null`.
 
 use std::time::Instant;
 
@@ -55,6 +56,8 @@ pub struct FleetVehicle {
     pub presence: &'static str,
     /// Management state of its primitive driver, or of the part that stands in for it.
     pub state: Option<&'static str>,
+    /// Whether it reports an emergency. If this station has set it: whether every part has confirmed that.
+    pub emergency: bool,
     /// Whether this station has put it in emergency, and repeats that until all parts confirm it.
     pub stop_set: bool,
     /// Measured forward speed in metres per second; `null` without a fresh measurement.
@@ -144,6 +147,8 @@ pub struct VehicleState {
     pub place: Option<Place>,
     /// Velocity.
     pub velocity: Option<Velocity>,
+    /// Milliseconds since its primitive driver reported its management state.
+    pub status_age_ms: Option<u64>,
     /// Components that offer Management or matter to the operator.
     pub parts: Vec<Part>,
     /// Components that have disappeared or fallen silent.

@@ -158,7 +158,7 @@ impl Control {
             State::Ready | State::Standby => true,
             State::Emergency => {
                 let has_setter = !self.emergencies.is_empty() || self.more_emergencies;
-                has_setter && !self.emergencies.iter().any(|&it| is_alive(it))
+                has_setter && !self.emergencies.keys().any(|&it| is_alive(it))
             }
             State::Initialize | State::Shutdown | State::Failure => false,
         }

@@ -1,5 +1,7 @@
 //! Management: the states of a component, and emergencies.
 
+use std::time::Instant;
+
 use super::{Condition, Control};
 use crate::address::JausId;
 use crate::codec::Message;
@@ -8,6 +10,7 @@ use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Shutdown, Standby,
     report_status,
 };
+use crate::service::order::{Mark, mark_of};
 use crate::service::{Handled, Outbox, State, read};
 
 /// Limit of remembered clients with an emergency. The next one replaces one that shows no life. If
@@ -32,6 +35,7 @@ impl Condition {
 impl Control {
     pub(super) fn handle_management(
         &mut self,
+        now: Instant,
         code: u16,
         message: &Received,
         is_alive: impl Fn(JausId) -> bool,
@@ -45,9 +49,11 @@ impl Control {
             Reset::CODE => self.reset(client, out),
             Shutdown::CODE => self.shut_down(client, out),
             // The emergency code does not matter: stopping is always right.
-            SetEmergency::CODE => self.set_emergency(client, is_alive),
+            SetEmergency::CODE => self.set_emergency((client, mark_of(now, message)), is_alive),
             ClearEmergency::CODE if clears_all(message) => self.clear_all(client, out),
-            ClearEmergency::CODE => self.clear_emergency(client, is_alive, out),
+            ClearEmergency::CODE => {
+                self.clear_emergency((client, mark_of(now, message)), is_alive, out);
+            }
             _ => return Handled::No,
         }
         Handled::Yes
@@ -127,16 +133,28 @@ impl Control {
         }
     }
 
-    fn set_emergency(&mut self, client: JausId, is_alive: impl Fn(JausId) -> bool) {
-        if self.emergencies.len() >= MOST_EMERGENCIES && !self.emergencies.contains(&client) {
-            let dead = self.emergencies.iter().find(|&&it| !is_alive(it)).copied();
+    fn set_emergency(
+        &mut self,
+        (client, mark): (JausId, Option<Mark>),
+        is_alive: impl Fn(JausId) -> bool,
+    ) {
+        let known = self.emergencies.get_mut(&client);
+        let is_known = known.is_some();
+        if let Some(last) = known {
+            let is_late = last
+                .zip(mark)
+                .is_some_and(|(last, mark)| last.is_after(mark));
+            *last = if is_late { *last } else { mark };
+        } else if self.emergencies.len() >= MOST_EMERGENCIES {
+            let dead = self.emergencies.keys().find(|&&it| !is_alive(it)).copied();
             match dead {
                 Some(dead) => _ = self.emergencies.remove(&dead),
                 None => self.more_emergencies = true,
             }
         }
-        if self.emergencies.len() < MOST_EMERGENCIES && self.emergencies.insert(client) {
+        if !is_known && self.emergencies.len() < MOST_EMERGENCIES {
             tracing::warn!(%client, "emergency");
+            self.emergencies.insert(client, mark);
         }
         self.begin_emergency();
     }
@@ -155,7 +173,7 @@ impl Control {
     /// Clears the emergencies of all clients, but not the component's own.
     fn clear_all(&mut self, client: JausId, out: &mut Outbox) {
         if self.standing.state == State::Emergency {
-            let setters = &self.emergencies;
+            let setters = self.emergencies.keys();
             tracing::warn!(%client, ?setters, "the emergencies of all clients are cleared");
             self.forget_emergencies();
             self.end_emergency(out);
@@ -167,16 +185,25 @@ impl Control {
         self.more_emergencies = false;
     }
 
-    /// Clears the emergency of a client. The client in control also clears those of dead clients.
+    /// Clears the emergency of a client, unless that has set it again since. The client in control also
+    /// clears those of dead clients.
     fn clear_emergency(
         &mut self,
-        client: JausId,
+        (client, mark): (JausId, Option<Mark>),
         is_alive: impl Fn(JausId) -> bool,
         out: &mut Outbox,
     ) {
-        let mut cleared = self.emergencies.remove(&client);
+        let last = self.emergencies.get(&client).copied().flatten();
+        if last
+            .zip(mark)
+            .is_some_and(|(last, mark)| last.is_after(mark))
+        {
+            tracing::info!(%client, "a late request to clear its emergency: it has set another one since");
+            return;
+        }
+        let mut cleared = self.emergencies.remove(&client).is_some();
         if self.is_controller(client) {
-            self.emergencies.retain(|&setter| {
+            self.emergencies.retain(|&setter, _| {
                 let stays = is_alive(setter);
                 if !stays {
                     tracing::warn!(%client, %setter, "cleared the emergency of a silent client");

@@ -44,10 +44,10 @@ pub use management::CLEAR_ALL;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use super::order::number_of;
+use super::order::{Mark, number_of};
 use super::{Handled, Outbox, Standing, State, code_of, read};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
@@ -168,7 +168,8 @@ pub(super) struct Control {
     /// The number of the last request by which the client in control got or renewed it.
     requested: Option<u16>,
     /// The clients that have set an emergency and not cleared it.
-    emergencies: BTreeSet<JausId>,
+    /// By the clients that have set them, with the last request of each.
+    emergencies: BTreeMap<JausId, Option<Mark>>,
     /// Whether more emergencies were set than the table holds.
     more_emergencies: bool,
     /// Whether the component has stopped by itself.
@@ -228,7 +229,7 @@ impl Control {
             return Handled::Yes;
         }
         if self.management.is_some() {
-            self.handle_management(code, message, is_alive, out)
+            self.handle_management(now, code, message, is_alive, out)
         } else {
             Handled::No
         }
@@ -307,7 +308,7 @@ impl Control {
 
     /// Whether a client has set an emergency and not cleared it.
     pub(super) fn has_emergency_of(&self, client: JausId) -> bool {
-        self.emergencies.contains(&client)
+        self.emergencies.contains_key(&client)
     }
 
     /// Whether the application is still initializing, including during an emergency.

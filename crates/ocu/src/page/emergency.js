@@ -91,18 +91,18 @@ export class Emergency {
       this.#closeSheet();
       toast("warn", "Somebody has stopped a vehicle again: look before you clear it.");
     }
-    if (vehicle) this.#confirm(vehicle, vehicle.emergency === true, stops);
+    if (vehicle) this.#confirm(vehicle, stops);
   }
 
   /** Takes a list of vehicles that has just arrived, and whether all are to be stopped. */
   handleFleet({ vehicles, allStopped, stops }) {
-    for (const vehicle of vehicles) this.#confirm(vehicle, vehicle.state === "emergency", stops);
+    for (const vehicle of vehicles) this.#confirm(vehicle, stops);
     if (allStopped && pendingStops(vehicles) === 0) this.#stops.confirm("all", stops);
   }
 
-  /** Takes what the station says of a vehicle with so many stops, and whether that reports its emergency. */
-  #confirm({ subsystem, stop_set: isSet }, isStopped, stops) {
-    if (isSet === true && isStopped) this.#stops.confirm(subsystem, stops);
+  /** Takes what the station says of a vehicle when it has taken so many stops. */
+  #confirm({ subsystem, stop_set: isSet, emergency }, stops) {
+    if (isSet === true && emergency === true) this.#stops.confirm(subsystem, stops);
   }
 
   /** Takes a key; true if it was for the emergency stop. Space types in fields, Escape never does. With

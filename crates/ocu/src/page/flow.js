@@ -3,10 +3,13 @@
 // which state the operator has seen last and for how long, so that the station knows how old it is.
 //
 // Frames to the station: [seq, held] confirms that the state `seq` is shown, `held` milliseconds after it
-// arrived, [seq] that it has arrived but is not shown, and [seq, held, forward, turn] drives.
+// arrived, [seq] that it has arrived but is not shown, [seq, held, forward, turn] drives, and [] ends that.
 
 /** A setpoint that has waited this long is not sent any more, in milliseconds. */
 const LONGEST_WAIT = 200;
+/** By a state that arrived so long ago the station lets nobody drive: it allows 0.3 s beyond the round trip, by a
+ * clock that may be 17 % slower. */
+const LONGEST_HELD = 360;
 /** Without a confirmation for this long, the station does not receive setpoints. */
 const STUCK = 1_000;
 /** Setpoints follow each other by so much: a round trip of it needs no second one under way. */
@@ -80,7 +83,7 @@ export class Flow {
     this.#waiting = null;
     if (!this.#driving) return;
     this.#driving = false;
-    this.#send({ type: "drive_end" });
+    this.#send([]);
   }
 
   /** The station has received a setpoint or a release. */
@@ -128,8 +131,9 @@ export class Flow {
     return true;
   }
 
-  /** Whether one more setpoint under way would not have to wait. */
+  /** Whether one more setpoint under way would neither have to wait, nor be refused. */
   #mayDrive() {
+    if (this.#held() > LONGEST_HELD) return false;
     const useful = 1 + Math.floor(this.#idleRoundTrip / PERIOD);
     return this.#underWay.length < Math.min(useful, this.#most) && this.#now() >= this.#restsUntil;
   }

@@ -108,7 +108,7 @@ export class Link extends EventTarget {
   /** The subprotocols of a WebSocket: they show the token, so that the station takes the page for one of
    * those that may drive from the start. */
   get protocols() {
-    return this.#token ? ["jaus", `token.${this.#token}`] : ["jaus"];
+    return this.#token ? ["jaus.4", `token.${this.#token}`] : ["jaus.4"];
   }
 
   start() {

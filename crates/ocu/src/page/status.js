@@ -116,7 +116,8 @@ export function showStatus(state, late) {
   const { vehicle } = state;
   const driver = part(state, "primitive_driver");
   const mode = vehicle?.emergency ? "emergency" : driver?.state;
-  const modeAge = (number(driver?.state_age_ms) ?? 0) + late;
+  const statusAge = vehicle?.status_age_ms;
+  const modeAge = (number(statusAge) ?? 0) + late;
   const box = get("state");
   mark(box, "data-state", mode ? plain(mode, 20) : "unknown");
   mark(box, "data-old", mode && modeAge > FRESH ? "yes" : null);
@@ -130,7 +131,7 @@ export function showStatus(state, late) {
   fill("heading", bearing(heading?.yaw), 0, heading, late);
   fill("north", pose?.x, 2, pose, late);
   fill("east", pose?.y, 2, pose, late);
-  const ages = [["state", driver?.state_age_ms], ["pose", pose?.age_ms], ["velocity", velocity?.age_ms]];
+  const ages = [["state", statusAge], ["pose", pose?.age_ms], ["velocity", velocity?.age_ms]];
   const old = ages.filter(([, age]) => number(age) !== null && age + late > FRESH);
   // There is room for one age only: what is old is often old for one reason.
   const oldest = Math.max(...old.map(([, age]) => age + late));

@@ -107,25 +107,29 @@ export class StopLink extends EventTarget {
     clearTimeout(this.#timer);
     this.#press[1] += 1;
     const press = this.press.join(".");
-    const stop = { frame: `${frame} ${press}`, request: { ...request, on: true, press: this.press } };
-    this.#stops.set(target, { ...stop, press, count: Infinity });
+    const what = { frame: `${frame} ${press}`, request: { ...request, on: true, press: this.press } };
+    const stop = { ...what, press, count: Infinity };
+    this.#stops.set(target, stop);
     this.#repeats = 0;
-    this.#repeat();
+    this.#repeat([stop]);
   }
 
-  /** The station has taken a press, which was so many stops in all. */
+  /** The station has taken a press, which was so many stops in all; null if somebody has cleared it since. */
   #note(press, stops) {
-    if (number(stops) === null) return;
-    for (const stop of this.#stops.values()) if (stop.press === press) stop.count = stops;
+    for (const [target, stop] of this.#stops) {
+      if (stop.press !== press) continue;
+      if (stops === null) this.cancel(target);
+      else if (number(stops) !== null) stop.count = stops;
+    }
   }
 
-  #repeat() {
+  /** Sends stops: all that are repeated, or one that is new. */
+  #repeat(stops = [...this.#stops.values()]) {
     const isNew = this.#repeats === 0;
-    const sent = this.#channels.map((channel) => channel.send(this.#frames, isNew));
+    const frames = stops.map(({ frame }) => frame);
+    const sent = this.#channels.map((channel) => channel.send(frames, isNew));
     // The other connection comes second: it may be busy, and this one is enough on a good network.
-    if (!sent.includes(true) || this.#repeats > 0) {
-      for (const { request } of this.#stops.values()) this.#link.send(request);
-    }
+    if (!sent.includes(true) || !isNew) for (const { request } of stops) this.#link.send(request);
     const pause = REPEATS[Math.min(this.#repeats++, REPEATS.length - 1)];
     this.#timer = setTimeout(() => this.#repeat(), pause);
   }
@@ -187,6 +191,7 @@ class Channel {
       this.#hear(socket);
       const [word, , press, stops] = String(data).split(" ", 4);
       if (word === "ok") this.#events.taken(press, Number(stops));
+      if (word === "cleared") this.#events.taken(press, null);
       if (word === "no") this.#events.refused(String(data).slice(3, 200));
     });
     socket.addEventListener("close", () => socket === this.#socket && this.#retry());

@@ -11,9 +11,10 @@ const speedWords = (speed) => `${figure(Math.abs(speed), 1)} m/s`;
  * `runaway`; null if no emergency is reported. `live` says whether the state itself is fresh.
  */
 export function stopCondition(vehicle, live) {
+  // Whatever its other parts report, or do not.
+  if (live && vehicle?.runaway === true) return "runaway";
   if (vehicle?.emergency !== true) return null;
   if (!live) return "unknown";
-  if (vehicle.runaway === true) return "runaway";
   if (vehicle.at_rest === true) return "stopped";
   return vehicle.at_rest === false ? "stopping" : "unknown";
 }
@@ -35,31 +36,35 @@ export function othersWords(may) {
   return may ? `${who}Clear it here only if you know why. ` : `${who}An administrator can clear it here. `;
 }
 
-/** The vehicles that are present or silent, by how far their stop is. */
+/** The vehicles by how far their stop is. */
 function sorted(vehicles) {
-  const present = vehicles.filter(({ presence }) => presence === "present");
-  const inEmergency = present.filter(({ state }) => state === "emergency");
-  // A silent one reports nothing: the station has to know of its stop.
-  const silent = vehicles.filter(({ presence, stop_set: isSet }) => presence === "silent" && isSet !== true);
+  const isPresent = ({ presence, state }) => presence === "present" && state !== null;
+  const present = vehicles.filter(isPresent);
+  const inEmergency = present.filter(({ emergency }) => emergency === true);
+  // Of these the station hears nothing: it has to know of their stop, and that is all.
+  const mute = vehicles.filter((one) => !isPresent(one) && !["gone", "unknown"].includes(one.presence));
+  const unset = mute.filter(({ stop_set: isSet }) => isSet !== true);
   return {
     present: present.length,
-    pending: present.length - inEmergency.length + silent.length,
-    runaways: inEmergency.filter(({ runaway }) => runaway === true).length,
+    pending: present.length - inEmergency.length + unset.length,
+    runaways: present.filter(({ runaway }) => runaway === true).length,
     moving: inEmergency.filter(({ at_rest: rest }) => rest === false).length,
     unknown: inEmergency.filter(({ at_rest: rest }) => rest !== true && rest !== false).length,
+    mute: vehicles.length - present.length,
   };
 }
 
-/** How many vehicles have not reported their emergency, or are silent and not even stopped by the station. */
+/** How many vehicles have not reported their emergency, or report nothing and are not even stopped by the station. */
 export const pendingStops = (vehicles) => sorted(vehicles).pending;
 
 /** What *Stop all* has reached, in words. `wanted` says whether it is still being sent. */
 export function stopAllWords(vehicles, wanted) {
-  const { present, pending, runaways, moving, unknown } = sorted(vehicles);
+  const { present, pending, runaways, moving, unknown, mute } = sorted(vehicles);
   if (runaways > 0) return `${runaways} RUNAWAY`;
   if (wanted && pending > 0) return `${pending} not stopped yet`;
   if (present === 0 || pending > 0) return `${vehicles.length} vehicles`;
   if (moving > 0) return `${moving} still moving`;
   if (unknown > 0) return `stop reported, ${unknown} unknown speed`;
+  if (mute > 0) return `${present} stopped, ${mute} not heard`;
   return "all are stopped";
 }

@@ -31,7 +31,7 @@ export function showSystem(state) {
 
 /** A part's state for the colours, and in words. A sensor or a store has no state: that it is there counts. */
 function condition(part, absence) {
-  const age = number(part?.age_ms) === null ? "" : ` ${duration(part.age_ms)}`;
+  const age = number(absence?.age_ms) === null ? "" : ` ${duration(absence.age_ms)}`;
   if (absence) return { state: "lost", word: `${{ gone: "Gone", restarted: "Restarted" }[absence.how] ?? "Silent"}${age}` };
   if (part?.managed !== true) return { state: "present", word: "" };
   const state = plain(part.state ?? "unknown", 20);

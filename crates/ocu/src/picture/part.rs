@@ -64,8 +64,9 @@ pub(crate) struct Part {
     pub(super) heard: Option<Instant>,
     /// Whether the last subscription event was a loss of reports.
     pub(super) is_down: bool,
-    /// Whether it was told to end an emergency: one that it reports may be over as soon as it hears that.
-    pub(super) is_clearing: bool,
+    /// Whether it has answered the last stop of this station: an emergency that it reports before may be another
+    /// one, which may be over by now.
+    pub(super) has_answered_stop: bool,
 }
 
 impl Part {
@@ -87,7 +88,7 @@ impl Part {
             velocity_age: SampleAge::default(),
             heard: None,
             is_down: false,
-            is_clearing: false,
+            has_answered_stop: false,
         }
     }
 

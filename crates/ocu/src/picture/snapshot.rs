@@ -30,7 +30,8 @@ impl Picture {
         parts.sort_by_key(|(id, part)| (part.role, **id));
         let describe = |(id, part): (&JausId, &Part)| self.part_state(*id, part, obstacle(*id));
         let any = self.in_emergency().next().is_some();
-        let all = any && self.not_in_emergency(now).next().is_none();
+        let driver = self.find(Role::PrimitiveDriver);
+        let status = driver.and_then(|id| self.parts.get(&id)?.status);
         Some(state::VehicleState {
             subsystem: self.vehicle,
             name: self.name.clone(),
@@ -46,7 +47,8 @@ impl Picture {
             parts: parts.into_iter().map(describe).collect(),
             missing: self.missing_state(now),
             stale: self.stale(now),
-            emergency: if emergency_wanted { all } else { any },
+            status_age_ms: status.map(|known| age(now, known.at)),
+            emergency: self.is_in_emergency(now, emergency_wanted),
             emergency_of_others: any && !emergency_wanted && !emergency_clearing,
             stop_set: emergency_wanted,
             at_rest: self.at_rest(now),
@@ -65,10 +67,7 @@ impl Picture {
         (held, requested, stop_set): (bool, bool, bool),
     ) -> state::FleetVehicle {
         let principal = self.principal().and_then(|id| self.parts.get(&id));
-        // What a part reports that was told to end an emergency may be older than the stop.
-        let is_doubtful = |part: &Part| stop_set && part.is_clearing;
-        let status = principal.filter(|part| !is_doubtful(part));
-        let status = status.and_then(|part| part.status);
+        let status = principal.and_then(|part| part.status);
         let presence = match principal {
             None if self.is_empty() => "unknown",
             None => "gone",
@@ -86,6 +85,7 @@ impl Picture {
             driver,
             presence,
             state: status.map(|known| state_name(known.what)),
+            emergency: self.is_in_emergency(now, stop_set),
             stop_set,
             speed: self.fresh_velocity(now).and_then(|it| it.x),
             at_rest: self.at_rest(now),

@@ -405,36 +405,47 @@ fn an_emergency_does_not_count_as_a_stop_before_the_speed_is_measured() {
 }
 
 #[test]
-fn an_emergency_of_a_part_that_was_told_to_end_it_confirms_a_new_stop_only_after_its_answer() {
+fn an_emergency_of_before_does_not_confirm_a_stop() {
     let start = Instant::now();
-    let report = |state: State| ReportStatus {
-        status: (state as u8).into(),
+    let emergency = || ReportStatus {
+        status: (State::Emergency as u8).into(),
         ..ReportStatus::default()
     };
     let mut picture = picture(start, &[driver()]);
-    picture.handle_report(start, DRIVER, report(State::Emergency).into());
-    let is_confirmed = |picture: &Picture| {
-        let fleet = picture.fleet_state(start, String::new(), (false, false, true));
-        let shown = picture.vehicle_state(start, (true, false), |_| None);
-        let shown = shown.unwrap().emergency;
-        assert_eq!(shown, fleet.state == Some("emergency"));
-        assert_eq!(shown, picture.not_in_emergency(start).next().is_none());
-        shown
+    let is_confirmed = |picture: &Picture, now: Instant| {
+        let listed = picture.fleet_state(now, String::new(), (false, false, true));
+        let shown = picture.vehicle_state(now, (true, false), |_| None);
+        assert_eq!(shown.unwrap().emergency, listed.emergency);
+        assert_eq!(listed.state, Some("emergency"));
+        assert_eq!(
+            listed.emergency,
+            picture.not_in_emergency(now).next().is_none()
+        );
+        listed.emergency
     };
-    assert!(is_confirmed(&picture));
-    picture.handle_clearing(DRIVER);
-    picture.handle_report(start, DRIVER, report(State::Emergency).into());
+    picture.handle_report(start, DRIVER, emergency().into());
+    picture.handle_stop(start);
     assert!(
-        !is_confirmed(&picture),
-        "it may have reported before it heard"
+        !is_confirmed(&picture, start),
+        "another one's, or of before"
     );
-    picture.handle_stopped(DRIVER);
-    assert!(is_confirmed(&picture));
-    picture.handle_clearing(DRIVER);
-    picture.handle_report(start, DRIVER, report(State::Standby).into());
-    assert!(!is_confirmed(&picture));
-    picture.handle_report(start, DRIVER, report(State::Emergency).into());
-    assert!(is_confirmed(&picture), "the one before has ended");
+    picture.handle_report(start + ms(1999), DRIVER, emergency().into());
+    assert!(
+        !is_confirmed(&picture, start + ms(1999)),
+        "under way before"
+    );
+    picture.handle_stop_answered(DRIVER);
+    assert!(is_confirmed(&picture, start + ms(1999)));
+    assert!(
+        !is_confirmed(&picture, start + ms(3999)),
+        "not heard any more"
+    );
+    // One that acknowledges nothing.
+    picture.handle_stop(start + ms(4000));
+    picture.handle_report(start + ms(5999), DRIVER, emergency().into());
+    assert!(!is_confirmed(&picture, start + ms(6000)));
+    picture.handle_report(start + ms(6000), DRIVER, emergency().into());
+    assert!(is_confirmed(&picture, start + ms(6000)));
 }
 
 #[test]

@@ -299,7 +299,7 @@ async fn serve_page(
 ) -> Response {
     let places = [&shared.places, &shared.strangers];
     match shared.admit_socket(address, &headers, places).await {
-        Ok(visitor) => of_page(upgrade).on_upgrade(async move |socket| {
+        Ok(visitor) => of_page(upgrade, &[SUBPROTOCOL]).on_upgrade(async move |socket| {
             socket::serve(socket, shared, visitor, introduction).await;
         }),
         Err(refusal) => refusal.into_response(),
@@ -314,24 +314,30 @@ async fn serve_stops(
 ) -> Response {
     let places = [&shared.stop_places, &shared.stop_strangers];
     match shared.admit_socket(address, &headers, places).await {
-        Ok(visitor) => of_page(upgrade).on_upgrade(async move |socket| {
-            stop_socket::serve(socket, shared, visitor).await;
-        }),
+        Ok(visitor) => {
+            let upgrade = of_page(upgrade, &[SUBPROTOCOL, OLDER_SUBPROTOCOL]);
+            upgrade.on_upgrade(async move |socket| {
+                stop_socket::serve(socket, shared, visitor).await;
+            })
+        }
         Err(refusal) => refusal.into_response(),
     }
 }
 
-/// The upgrade to a WebSocket of a page.
-fn of_page(upgrade: WebSocketUpgrade) -> WebSocketUpgrade {
+/// The upgrade to a WebSocket of a page that names one of these subprotocols, or none.
+fn of_page(upgrade: WebSocketUpgrade, subprotocols: &'static [&str]) -> WebSocketUpgrade {
     upgrade
-        .protocols([SUBPROTOCOL])
+        .protocols(subprotocols.iter().copied())
         .max_message_size(bounds::LARGEST_FRAME)
         .max_frame_size(bounds::LARGEST_FRAME)
 }
 
 /// The subprotocol of a page's WebSocket. A browser sets no other header of a WebSocket, so a page
-/// names the token there as well.
-const SUBPROTOCOL: &str = "jaus";
+/// names the token there as well. A page that was loaded from an older station knows no
+/// [changes](crate::changes) of states and must not show them: its browser gives a WebSocket up for which the
+/// station does not choose one of its subprotocols. It can still stop vehicles.
+const SUBPROTOCOL: &str = "jaus.4";
+const OLDER_SUBPROTOCOL: &str = "jaus";
 const TOKEN_SUBPROTOCOL: &str = "token.";
 
 /// The token that a page shows as it opens a WebSocket.

@@ -381,8 +381,8 @@ impl Reader<'_> {
             let answers = self.answers.clone();
             let reply = StopReply {
                 taken: Box::new(move |taken| {
-                    let count = taken.ok().and_then(|it| it.count);
-                    if let Some((press, stops)) = press.zip(count) {
+                    if let Some((press, taken)) = press.zip(taken.ok()) {
+                        let stops = taken.count;
                         say(&answers, &Answer::Stopped { press, stops });
                     }
                 }),
@@ -563,6 +563,8 @@ impl Writer<'_> {
                 },
             };
             next.extend(message);
+            // The page acknowledges each packet, perhaps over a link on which that takes time.
+            next.extend(std::iter::from_fn(|| answers.try_recv().ok()).map(Message::Text));
             // What goes with a state costs the way back nothing.
             if may_send && !next.is_empty() {
                 if links.tick().now_or_never().is_some() {
@@ -598,12 +600,13 @@ impl Writer<'_> {
 
     /// What has changed in the state of the page's vehicle; `None` before the first.
     fn state(&mut self) -> Option<Message> {
-        let snapshot = self.snapshots.borrow_and_update();
+        let snapshot = self.snapshots.borrow_and_update().clone();
         if snapshot.fields.is_empty() {
             return None;
         }
         let mut link = self.link.lock();
         link.handle_sent(now(), snapshot.seq, snapshot.vehicle);
+        drop(link);
         let changed = changes(&self.said, &snapshot.fields);
         self.said = Arc::clone(&snapshot.fields);
         Some(text(&json(&Answer::State(&changed))))

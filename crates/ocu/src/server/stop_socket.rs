@@ -4,9 +4,10 @@
 //! A page sends `stop SUBSYSTEM PRESS` or `stop-all PRESS`, and repeats it until the vehicles have
 //! confirmed the emergency. The [press](crate::press), which may be left out, tells copies from new
 //! stops. The answer is `ok SUBSYSTEM PRESS COUNT` or `ok all PRESS COUNT` when the emergency has been
-//! sent to the vehicle, or `no REASON`. The count is that of all stops that the station had taken then: a state
-//! that names a lower one was made before. Where reading requires the token, `token TOKEN` comes first. The station sends an empty
-//! frame every 10 s.
+//! sent, `cleared SUBSYSTEM PRESS` if this press was cleared since, or `no REASON`. The count is that of
+//! all stops that the station has taken with this one: a state that names a lower one was made before.
+//! Where reading requires the token, `token TOKEN` comes first. The station sends an empty frame every
+//! 10 s.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -154,7 +155,7 @@ impl<'s> Stops<'s> {
                 None => OperatorRequest::EmergencyAll { on: true },
             };
             let answer = match result {
-                Ok(taken) => in_words(vehicle, press.zip(taken.count)),
+                Ok(taken) => in_words(vehicle, press, taken.count),
                 Err(why) => format!("no {why}"),
             };
             if result.map_or(true, |it| it.is_new) {
@@ -175,13 +176,14 @@ impl<'s> Stops<'s> {
     }
 }
 
-/// The answer to a stop of a vehicle, or of all, with its press and the number of stops.
-fn in_words(vehicle: Option<u16>, taken: Option<(Press, u64)>) -> String {
+/// The answer to a stop of a vehicle, or of all, with its press and the number of stops, unless it was cleared.
+fn in_words(vehicle: Option<u16>, press: Option<Press>, count: Option<u64>) -> String {
     let target = vehicle.map_or_else(|| "all".to_owned(), |it| it.to_string());
-    taken.map_or_else(
-        || format!("ok {target}"),
-        |(press, count)| format!("ok {target} {press} {count}"),
-    )
+    match (press, count) {
+        (Some(press), Some(count)) => format!("ok {target} {press} {count}"),
+        (Some(press), None) => format!("cleared {target} {press}"),
+        (None, _) => format!("ok {target}"),
+    }
 }
 
 /// The vehicle of a stop, `None` for all, and the press.

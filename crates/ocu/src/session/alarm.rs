@@ -55,13 +55,13 @@ impl Alarm {
             tracing::info!("emergency: stopping vehicle {}", picture.vehicle());
             self.since = Some(now);
             self.shouted = None;
-        }
-        self.wanted = true;
-        if self.clearing.take().is_some() {
-            // What is still being told would undo the stop.
+            picture.handle_stop(now);
+            // What is still being told to end an emergency must not hear that after the stop.
             self.busy.values().for_each(AbortHandle::abort);
             self.busy.clear();
         }
+        self.wanted = true;
+        self.clearing = None;
         self.handle_time(now, picture, client);
         is_new
     }
@@ -76,7 +76,7 @@ impl Alarm {
         &mut self,
         now: Instant,
         whose: Cleared,
-        picture: &mut Picture,
+        picture: &Picture,
         client: &mut Client,
     ) {
         if self.wanted {
@@ -124,7 +124,7 @@ impl Alarm {
     }
 
     /// Starts the pending deliveries and answers waiting requesters.
-    pub(super) fn handle_time(&mut self, now: Instant, picture: &mut Picture, client: &mut Client) {
+    pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, client: &mut Client) {
         if self.wanted {
             self.shout(now, picture, client);
         }
@@ -135,13 +135,8 @@ impl Alarm {
             None => return self.answer(now, picture),
         };
         for part in left {
-            if self.busy.contains_key(&part) {
-                continue;
-            }
-            if matches!(change, AlarmChange::Clear(_)) {
-                picture.handle_clearing(part);
-            }
-            self.busy.insert(part, client.alarm(part, change));
+            let told = self.busy.entry(part);
+            told.or_insert_with(|| client.alarm(part, change));
         }
         self.answer(now, picture);
     }

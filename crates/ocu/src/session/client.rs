@@ -13,8 +13,7 @@ use crate::stick::Push;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{
-    Component, DeliverError, QueryOptions, Retake, Session, SessionError, SessionSettings,
-    TargetState,
+    Component, QueryOptions, Retake, Session, SessionError, SessionSettings, TargetState,
 };
 use jaus::messages::core::{QueryStatus, ReportStatus};
 
@@ -45,10 +44,11 @@ pub(super) enum Finished {
         edition: Edition,
         result: Result<Bytes, String>,
     },
-    /// A part received the start or the end of an emergency, with its status afterwards.
+    /// A part was told the start or the end of an emergency, with its status afterwards.
     Alarmed {
         peer: JausId,
-        change: AlarmChange,
+        /// Whether it has acknowledged the start.
+        is_stopped: bool,
         status: Option<ReportStatus>,
     },
 }
@@ -105,7 +105,7 @@ impl Client {
         loop {
             match self.jobs.join_next().await {
                 Some(Ok(finished)) => return Some(finished),
-                // A stop that a newer setpoint has replaced.
+                // What something newer has replaced: the end of a drive, or what was told of an emergency.
                 Some(Err(_)) => {}
                 None => std::future::pending().await,
             }
@@ -191,17 +191,19 @@ impl Client {
     pub(super) fn alarm(&mut self, peer: JausId, change: AlarmChange) -> AbortHandle {
         let component = self.component.clone();
         self.jobs.spawn(async move {
-            let deed = async {
-                note(peer, emergency::deliver(&component, peer, change).await);
-            };
             // Some peers never acknowledge. Their status decides.
-            let _ = timeout(ALARM_PATIENCE, deed).await;
+            let told = timeout(ALARM_PATIENCE, emergency::deliver(&component, peer, change));
+            let told = told.await;
+            if let Ok(Err(error)) = &told {
+                tracing::debug!(%peer, %error, "not acknowledged");
+            }
+            let is_stopped = change == AlarmChange::Set && matches!(told, Ok(Ok(())));
             let status = component.query(peer, &QueryStatus {});
             let status = timeout(ALARM_PATIENCE, status).await;
             let status = status.ok().and_then(Result::ok);
             Finished::Alarmed {
                 peer,
-                change,
+                is_stopped,
                 status,
             }
         })
@@ -212,12 +214,6 @@ impl Client {
         if let Err(error) = emergency::send(&self.component, peer) {
             tracing::warn!(%peer, %error, "cannot send the emergency");
         }
-    }
-}
-
-fn note(peer: JausId, delivered: Result<(), DeliverError>) {
-    if let Err(error) = delivered {
-        tracing::debug!(%peer, %error, "not acknowledged");
     }
 }
 

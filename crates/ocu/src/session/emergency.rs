@@ -11,7 +11,7 @@ use super::client::{Cleared, Client, Finished};
 use super::control::{NO_VEHICLE, in_words};
 use super::vehicle::Vehicle;
 use crate::orders::{Reply, StopOrder, StopReply, StopTarget};
-use crate::press::KnownStops;
+use crate::press::{KnownStops, Press};
 use crate::request::OperatorRequest;
 
 /// Nothing that can be stopped has shown itself.
@@ -39,7 +39,7 @@ impl Session {
             return reply.ignored();
         };
         if all {
-            self.stop_all(now, count, reply);
+            self.stop_all(now, (press, count), reply);
             return self.note_emergency_of_all(now, &user, true);
         }
         self.note_emergency(now, number, &user, true);
@@ -57,11 +57,16 @@ impl Session {
     }
 
     /// Stops all vehicles, also those that appear later, and those of which no part is known yet.
-    fn stop_all(&mut self, now: Instant, count: u64, reply: StopReply) {
+    fn stop_all(&mut self, now: Instant, (press, count): (Option<Press>, u64), reply: StopReply) {
         let is_new = !self.all_stopped;
         self.all_stopped = true;
         let mut stopped = Vec::new();
         for vehicle in self.fleet.iter_mut() {
+            let number = Some(vehicle.number());
+            // A copy, which arrives after somebody has cleared this one.
+            if press.is_some_and(|press| self.presses.is_cleared(press, number)) {
+                continue;
+            }
             vehicle.set_emergency(now, &mut self.client);
             if vehicle.has_managed() {
                 stopped.push(vehicle);
@@ -116,6 +121,7 @@ impl Session {
         vehicle.await_emergency(now, false, reply);
         if !self.fleet.iter_mut().any(|it| it.alarm.is_wanted()) {
             self.all_stopped = false;
+            self.presses.clear_stops_of_all();
             self.publish_fleet(now);
         }
     }
@@ -188,7 +194,7 @@ impl Vehicle {
     }
 
     fn clear_emergency(&mut self, now: Instant, whose: Cleared, client: &mut Client) {
-        self.alarm.clear(now, whose, &mut self.picture, client);
+        self.alarm.clear(now, whose, &self.picture, client);
     }
 
     fn await_emergency(&mut self, now: Instant, on: bool, reply: Reply) {

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
-use self::client::{AlarmChange, Client, Finished};
+use self::client::{Client, Finished};
 use self::fleet::Fleet;
 use super::answer::Said;
 use super::events::EventLog;
@@ -194,14 +194,14 @@ impl Session {
             }
             Finished::Alarmed {
                 peer,
-                change,
+                is_stopped,
                 status,
             } => {
                 if let Some(vehicle) = self.fleet.get_mut(peer.subsystem()) {
                     vehicle.alarm.handle_told(peer);
                     if let Some(report) = status {
-                        if change == AlarmChange::Set {
-                            vehicle.picture.handle_stopped(peer);
+                        if is_stopped {
+                            vehicle.picture.handle_stop_answered(peer);
                         }
                         vehicle.handle_report(now, peer, report.into());
                     }

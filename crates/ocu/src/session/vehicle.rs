@@ -98,7 +98,7 @@ impl Vehicle {
             // Whatever the source of the emergency: nothing resumes on its own afterwards.
             self.lease.set_ready(false);
         }
-        self.alarm.handle_time(now, &mut self.picture, client);
+        self.alarm.handle_time(now, &self.picture, client);
         self.stop_after_lost_planner(now);
         self.yield_to_other();
         self.handover

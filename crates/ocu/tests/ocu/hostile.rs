@@ -331,7 +331,7 @@ async fn by_default_a_page_on_loopback_needs_the_token_for_everything() {
 
 /// Opens a page that shows a token as it connects.
 async fn page_with(scene: &Scene, token: &str) -> Result<Page, Box<Error>> {
-    let protocols = format!("jaus, token.{token}");
+    let protocols = format!("jaus.4, token.{token}");
     Page::try_open(scene.address, &[("sec-websocket-protocol", &protocols)]).await
 }
 

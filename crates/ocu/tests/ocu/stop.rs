@@ -9,7 +9,7 @@ use jaus_test_kit::waiting::within_limit;
 use serde_json::json;
 use tokio::time::timeout;
 use tokio_tungstenite::connect_async;
-use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::{ClientRequestBuilder, Message};
 
 use crate::scene::{Page, Scene, Socket, driver_of};
 
@@ -79,7 +79,8 @@ async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
             .unwrap();
         scene.until(|scene| !emergency(scene)).await;
         let late = say(&mut socket, &pressed(first)).await;
-        assert_eq!(late, answer, "a late copy");
+        let cleared = answer.replace("ok", "cleared");
+        assert_eq!(late, format!("{cleared} 7.{first}"), "a late copy");
         page.ask(json!({"type": "standby"})).await.unwrap();
         assert!(!emergency(&scene), "{stop}");
         for new in [&pressed(first + 1), stop] {
@@ -89,6 +90,44 @@ async fn a_late_copy_of_a_stop_that_its_page_has_cleared_stops_nothing() {
             page.ask(json!({"type": clear, "on": false})).await.unwrap();
             scene.until(|scene| !emergency(scene)).await;
         }
+    }
+}
+
+#[tokio::test]
+async fn a_copy_of_a_stop_that_another_page_has_cleared_stops_nothing() {
+    let scene = Scene::new().await;
+    let second = scene.another_vehicle(102);
+    let mut socket = stops(&scene).await;
+    let mut page = scene.driver().await;
+    for (stop, copy) in [
+        ("stop 101 7.1", "cleared 101 7.1"),
+        ("stop-all 7.2", "ok all 7.2 2"),
+    ] {
+        say(&mut socket, stop).await;
+        scene.until(emergency).await;
+        let known = page.until(|it| it["vehicle"]["emergency"] == true).await;
+        let clear =
+            json!({"type": "emergency", "on": false, "press": [8, 0], "stops": known["stops"]});
+        page.ask(clear).await.unwrap();
+        scene.until(|scene| !emergency(scene)).await;
+        // The page that has pressed has not heard of it, and goes on.
+        assert_eq!(say(&mut socket, stop).await, copy);
+        page.ask(json!({"type": "standby"})).await.unwrap();
+        assert!(!emergency(&scene), "{stop}");
+    }
+    assert_eq!(second.rover.standing().state, State::Emergency);
+    say(&mut socket, "stop-all 7.3").await;
+    scene.until(emergency).await;
+}
+
+#[tokio::test]
+async fn a_page_of_an_older_station_is_refused_and_can_still_stop() {
+    let scene = Scene::new().await;
+    for (path, is_open) in [("ws", false), ("stop", true)] {
+        let url = format!("ws://{}/{path}", scene.address).parse().unwrap();
+        let request = ClientRequestBuilder::new(url).with_sub_protocol("jaus");
+        // As in a browser, it fails if the station has chosen none of what it names.
+        assert_eq!(within_limit(connect_async(request)).await.is_ok(), is_open);
     }
 }
 

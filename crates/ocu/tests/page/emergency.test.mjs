@@ -54,6 +54,8 @@ function page({ vehicle = 101, barred = "" } = {}) {
   const fleet = new Fleet(() => {});
   link.dispatchEvent(new CustomEvent("hello", { detail: {} }));
   const state = (changes, stops) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes }, stops });
+  const lastPress = () => Socket.all.flatMap(({ sent }) => sent).at(-1).split(" ").at(-1);
+  const say = (data) => Socket.all[0].dispatchEvent(Object.assign(new Event("message"), { data }));
   const update = (shown) => emergency.update(shown, true, { vehicles: [], allStopped: false }, barred, clears);
   update(null);
   return {
@@ -63,10 +65,9 @@ function page({ vehicle = 101, barred = "" } = {}) {
     asked,
     update: () => update(null),
     /** The station says that it has taken what was pressed last, and how many stops that were. */
-    take: (stops) => {
-      const press = Socket.all.flatMap(({ sent }) => sent).at(-1).split(" ").at(-1);
-      Socket.all[0].dispatchEvent(Object.assign(new Event("message"), { data: `ok 101 ${press} ${stops}` }));
-    },
+    take: (stops) => say(`ok 101 ${lastPress()} ${stops}`),
+    /** The station says that what was pressed last was cleared since. */
+    clear: () => say(`cleared all ${lastPress()}`),
     /** A state arrives. */
     hear: (changes, stops = 0) => {
       const detail = state(changes, stops);
@@ -126,7 +127,7 @@ test("what was said before the station had a stop does not confirm it, however l
   // Other pages have stopped and cleared this vehicle meanwhile, of which this page has not heard yet.
   emergency.stop();
   take(5);
-  const stopped = [{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }];
+  const stopped = [{ subsystem: 101, state: "emergency", emergency: true, presence: "present", stop_set: true }];
   for (const stops of [3, 4]) {
     hear({ emergency: true, stop_set: true }, stops);
     hearFleet(stopped, stops, true);
@@ -148,6 +149,16 @@ test("a stop is confirmed only once the station has said which of all it was, an
   take(1);
   hear({ emergency: true, stop_set: true }, 1);
   assert.deepEqual(repeated(), []);
+});
+
+test("a stop that somebody has cleared, who knew of it, is not repeated any more", () => {
+  const { emergency, take, clear, repeated } = page();
+  emergency.stop();
+  take(1);
+  emergency.stopAll();
+  assert.deepEqual(repeated(), ["stop 101", "stop-all"]);
+  clear();
+  assert.deepEqual(repeated(), ["stop 101"]);
 });
 
 test("a stop after one's own clearing outlives it", async () => {
@@ -180,7 +191,7 @@ test("each vehicle is stopped for itself, whichever the page shows", () => {
   emergency.stop();
   take(2);
   assert.deepEqual(repeated(), ["stop 101", "stop 102"]);
-  hearFleet([{ subsystem: 101, state: "emergency", presence: "present", stop_set: true }], 2);
+  hearFleet([{ subsystem: 101, state: "emergency", emergency: true, presence: "present", stop_set: true }], 2);
   assert.deepEqual(repeated(), ["stop 102"]);
 });
 
@@ -196,7 +207,7 @@ test("a stop that was pressed before the page knew a vehicle is sent when it doe
 test("a stop of all is confirmed by the latch and the station's stop of each, and not by vehicles that are already stopped", () => {
   const { emergency, hearFleet, take, repeated } = page();
   const known = (isSet) => [
-    { subsystem: 101, state: "emergency", presence: "present" },
+    { subsystem: 101, state: "emergency", emergency: true, presence: "present" },
     { subsystem: 102, state: "ready", presence: "silent", stop_set: isSet },
     { subsystem: 103, state: null, presence: "gone" },
   ];

@@ -154,6 +154,17 @@ test("the token comes first, and a refusal is told", () => {
   assert.equal(reason, "vehicle 7 is unknown");
 });
 
+test("a press sends its own stop at once, and the others only when it is their turn", () => {
+  const { stops, sockets, sent } = rig();
+  sockets[0].open();
+  for (let vehicle = 101; vehicle < 116; vehicle++) {
+    stops.stop(vehicle);
+    assert.deepEqual(sent()[0], [`stop ${vehicle}`]);
+  }
+  mock.timers.tick(50);
+  assert.equal(sent()[0].length, 15);
+});
+
 test("each stop is repeated until it is confirmed itself", () => {
   const { stops, sockets, requests, sent } = rig();
   sockets[0].open();

@@ -29,16 +29,20 @@ test("the button says the speed while the vehicle stops, and 'stopped' in no oth
 });
 
 test("all are stopped only if each of them is measured at rest", () => {
-  const one = (changes) => ({ presence: "present", state: "emergency", at_rest: true, runaway: false, ...changes });
+  const one = (changes) => ({ presence: "present", state: "emergency", emergency: true, at_rest: true, runaway: false, ...changes });
   assert.equal(stopAllWords([one(), one()], false), "all are stopped");
   assert.equal(stopAllWords([one(), one({ at_rest: false })], false), "1 still moving");
   assert.equal(stopAllWords([one(), one({ at_rest: null })], true), "stop reported, 1 unknown speed");
-  assert.equal(stopAllWords([one(), one({ state: "ready" })], true), "1 not stopped yet");
-  assert.equal(stopAllWords([one(), one({ state: "ready" })], false), "2 vehicles");
+  assert.equal(stopAllWords([one(), one({ emergency: false })], true), "1 not stopped yet");
+  assert.equal(stopAllWords([one(), one({ emergency: false })], false), "2 vehicles");
   assert.equal(stopAllWords([one(), one({ at_rest: false, runaway: true })], false), "1 RUNAWAY");
+  assert.equal(stopAllWords([one({ emergency: false, runaway: true })], false), "1 RUNAWAY", "another part is not stopped");
   assert.equal(stopAllWords([], false), "0 vehicles");
   assert.equal(stopAllWords([one(), one({ presence: "silent", stop_set: false })], true), "1 not stopped yet");
-  assert.equal(pendingStops([one(), one({ state: "ready" }), one({ state: "ready", presence: "gone" })]), 1);
+  for (const mute of [{ presence: "silent", stop_set: true }, { presence: "gone" }, { state: null, stop_set: true }]) {
+    assert.equal(stopAllWords([one(), one(mute)], true), "1 stopped, 1 not heard");
+  }
+  assert.equal(pendingStops([one(), one({ emergency: false }), one({ emergency: false, presence: "gone" })]), 1);
 });
 
 test("who may not clear the emergency of others reads who can", () => {

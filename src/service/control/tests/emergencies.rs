@@ -46,6 +46,38 @@ fn an_emergency_that_is_set_again_stays_and_is_cleared_at_once() {
 }
 
 #[test]
+fn a_late_request_to_clear_does_not_end_an_emergency_that_its_client_has_set_since() {
+    let mut rig = Rig::ready();
+    let hear = |rig: &mut Rig, stops: bool, number: u16| {
+        rig.number = Some(number);
+        _ = match stops {
+            true => rig.hear(THIRD, &STOP),
+            false => rig.hear(THIRD, &CLEAR),
+        };
+        rig.number = None;
+        rig.state()
+    };
+    hear(&mut rig, true, 65_530);
+    assert_eq!(hear(&mut rig, true, 2), State::Emergency);
+    assert_eq!(hear(&mut rig, false, 1), State::Emergency, "sent before");
+    assert_eq!(hear(&mut rig, true, 0), State::Emergency, "a late copy");
+    assert_eq!(hear(&mut rig, false, 1), State::Emergency, "still before");
+    assert_eq!(hear(&mut rig, false, 3), State::Standby);
+    // A client that counts anew, and one that does not count.
+    hear(&mut rig, true, 20_000);
+    assert_eq!(hear(&mut rig, false, 0), State::Standby);
+    hear(&mut rig, true, 0);
+    assert_eq!(hear(&mut rig, false, 0), State::Standby);
+    hear(&mut rig, true, 9);
+    rig.pass(Duration::from_secs(4));
+    assert_eq!(
+        hear(&mut rig, false, 8),
+        State::Standby,
+        "no network delays it so long"
+    );
+}
+
+#[test]
 fn an_emergency_ends_when_the_last_of_several_is_cleared() {
     let mut rig = Rig::ready();
     for client in [SECOND, THIRD, SECOND] {

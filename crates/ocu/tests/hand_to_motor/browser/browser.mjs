@@ -4,7 +4,7 @@
 //
 // {"page": 1, "now": 12.5, "open": true}         loads the page anew
 // {"page": 1, "now": 12.5, "events": [[11.5, "key", "keydown", "KeyW", false], …]}
-// → {"out": [["connect", 3, "/ws?vehicle=101", ["jaus"]], ["send", 3, "…"], ["close", 3]], "next": 60.2, "view": {…}}
+// → {"out": [["connect", 3, "/ws?vehicle=101", ["jaus.4"]], ["send", 3, "…"], ["close", 3]], "next": 60.2, "view": {…}}
 //
 // `now` is `performance.now()` of the page's host, and an event begins with when it happened; `next` is
 // when the page has to be called again. After a pause of the page ("thaws": "timers" or "events") it learns
