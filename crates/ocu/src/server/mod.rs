@@ -86,6 +86,8 @@ struct Shared {
     /// Limits the number of tiles of the map file that are read at once.
     readers: Arc<Semaphore>,
     pages: AtomicU64,
+    /// How many connections for stops were opened.
+    stop_connections: AtomicU64,
     counters: Counters,
 }
 
@@ -151,6 +153,7 @@ impl Server {
             attempts: Mutex::new(Attempts::new()),
             readers: Arc::new(Semaphore::new(base_map::READERS)),
             pages: AtomicU64::new(0),
+            stop_connections: AtomicU64::new(0),
             counters: Counters::default(),
         };
         Self {

@@ -562,6 +562,10 @@ impl Writer<'_> {
                     None => return,
                 },
             };
+            if message.is_some() {
+                // Whatever it answers shows that it is there.
+                pings.reset();
+            }
             next.extend(message);
             // The page acknowledges each packet, perhaps over a link on which that takes time.
             next.extend(std::iter::from_fn(|| answers.try_recv().ok()).map(Message::Text));

@@ -14,8 +14,9 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
+use futures_util::SinkExt;
 use tokio::sync::mpsc;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 
 use super::Shared;
 use super::bounds::{Bucket, FRAMES};
@@ -27,11 +28,10 @@ use crate::request::OperatorRequest;
 use crate::users::UserRole;
 use jaus::node::now;
 
-/// Interval of empty frames, by which the page knows that the connection works. TCP acknowledges each
-/// with 52 octets, and repeats it several times on a way back that has become slow.
+/// Interval of empty frames, by which the page knows that the connection works, each with a ping, whose answer
+/// keeps the connection from being idle. They share a packet: the browser acknowledges each, and repeats that
+/// several times on a way back that has become slow.
 const PULSE: Duration = Duration::from_secs(10);
-/// Interval of pings. Their answers keep the connection from being idle.
-const PING: Duration = Duration::from_secs(10);
 /// A page that accepts no data for this time is disconnected.
 const STUCK: Duration = Duration::from_secs(5);
 /// Largest frame, except that with the token.
@@ -74,25 +74,41 @@ impl<'s> Stops<'s> {
     }
 
     async fn run(mut self, socket: &mut WebSocket) -> Option<Parting> {
-        let mut pulses = interval(PULSE);
-        pulses.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut pings = interval(PING);
-        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut pulses = self.pulses();
+        let mut next = Some(Message::Text(Utf8Bytes::from_static("")));
         loop {
-            let message = tokio::select! {
+            if let Some(message) = next.take() {
+                timeout(STUCK, socket.send(message)).await.ok()?.ok()?;
+            }
+            next = tokio::select! {
                 biased;
                 frame = socket.recv() => {
                     if let Some(parting) = self.handle(frame?.ok()?).await {
                         return Some(parting);
                     }
-                    continue;
+                    None
                 }
-                Some(answer) = self.waiting.recv() => Message::Text(answer.into()),
-                _ = pulses.tick() => Message::Text(Utf8Bytes::from_static("")),
-                _ = pings.tick() => Message::Ping(axum::body::Bytes::new()),
+                Some(answer) = self.waiting.recv() => Some(Message::Text(answer.into())),
+                _ = pulses.tick() => {
+                    let ping = socket.feed(Message::Ping(axum::body::Bytes::new()));
+                    timeout(STUCK, ping).await.ok()?.ok()?;
+                    Some(Message::Text(Utf8Bytes::from_static("")))
+                }
             };
-            timeout(STUCK, socket.send(message)).await.ok()?.ok()?;
         }
+    }
+
+    /// The times of the empty frames after the first. A page opens two connections, which take turns.
+    fn pulses(&self) -> Interval {
+        let is_even = self
+            .shared
+            .stop_connections
+            .fetch_add(1, Relaxed)
+            .is_multiple_of(2);
+        let first = if is_even { PULSE } else { PULSE / 2 };
+        let mut pulses = interval_at(Instant::now() + first, PULSE);
+        pulses.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        pulses
     }
 
     async fn handle(&mut self, message: Message) -> Option<Parting> {
