@@ -12,6 +12,7 @@ export class FakeElement extends EventTarget {
   setAttribute = (name, value) => this.#attributes.set(name, String(value));
   removeAttribute = (name) => this.#attributes.delete(name);
   contains = () => false;
+  closest = () => this;
   append() {}
   remove() {}
   focus() {}

@@ -5,7 +5,9 @@ import test from "node:test";
 
 import { condition, controller } from "../../src/page/fleet.js";
 import { currentReason } from "../../src/page/mission.js";
-import { hop, hops } from "../../src/page/status.js";
+import { forgetElements, get } from "./fake_elements.mjs";
+
+const { hop, hops, showStatus } = await import("../../src/page/status.js");
 
 test("both hops show their round trip and their loss, as far as they are known", () => {
   assert.equal(hop(42.4, 0), "42 ms");
@@ -15,6 +17,18 @@ test("both hops show their round trip and their loss, as far as they are known",
   assert.equal(hops(quality), "station 20 ms · vehicle 310 ms, 5 % lost");
   assert.equal(hops(null), "");
   assert.equal(hops({ roundTripMs: "x", vehicleRoundTripMs: 9 }), "vehicle 9 ms");
+});
+
+test("a state that the vehicle has reported long ago is marked, and its age is said", () => {
+  const shown = (age, late) => {
+    forgetElements();
+    const parts = [{ role: "primitive_driver", managed: true, state: "ready" }];
+    showStatus({ vehicle: { parts, status_age_ms: age, pose: { x: 1, age_ms: 100 }, velocity: { x: 1, age_ms: 100 } } }, late);
+    return [get("state").getAttribute("data-old"), get("state-old").textContent];
+  };
+  assert.deepEqual(shown(100, 0), [null, ""]);
+  assert.deepEqual(shown(60_000, 0), ["yes", "60 s old: state"]);
+  assert.equal(shown(100, 5_000)[0], "yes", "the picture itself is old");
 });
 
 test("the list says who of this station drives, and whether a vehicle moves in emergency", () => {
