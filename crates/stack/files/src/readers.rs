@@ -1,0 +1,184 @@
+//! Who may read a file, and the check that nobody else can read or change it.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+/// Who may read a file besides root. Only its owner may change it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Readers {
+    /// Its owner alone: keys, tokens, password hashes, audit logs. Mode 0600.
+    Owner,
+    /// Its owner and group: recordings and logs of traffic. Mode 0640.
+    Group,
+    /// Every user of the host: trusted keys and certificates. Mode 0644.
+    Everyone,
+}
+
+impl Readers {
+    /// The mode of a new file, which the umask may narrow.
+    pub(crate) const fn mode(self) -> u32 {
+        match self {
+            Self::Owner => 0o600,
+            Self::Group => 0o640,
+            Self::Everyone => 0o644,
+        }
+    }
+}
+
+/// Reads a file of at most `longest` octets that only `readers` can read and only its owner can change.
+///
+/// # Errors
+/// If the file cannot be read or is longer; [`io::ErrorKind::PermissionDenied`] if other users of the host
+/// can read it, change it, or replace it because they can write its folder.
+pub fn read(path: &Path, readers: Readers, longest: u64) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    check(path, &file, readers)?;
+    let mut octets = Vec::new();
+    // A pipe, such as `<(pass show token)` of a shell, has no length beforehand.
+    file.take(longest + 1).read_to_end(&mut octets)?;
+    if octets.len() as u64 > longest {
+        let text = format!("it is longer than {longest} octets");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, text));
+    }
+    Ok(octets)
+}
+
+/// Reads a text file; otherwise as [`read`].
+///
+/// # Errors
+/// As [`read`]; [`io::ErrorKind::InvalidData`] if it is not UTF-8.
+pub fn read_text(path: &Path, readers: Readers, longest: u64) -> io::Result<String> {
+    String::from_utf8(read(path, readers, longest)?)
+        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+}
+
+/// Checks the open file, so that what is read is what was checked.
+#[cfg(unix)]
+fn check(path: &Path, file: &File, readers: Readers) -> io::Result<()> {
+    use std::os::unix::fs::MetadataExt as _;
+
+    let denied = |text: String| Err(io::Error::new(io::ErrorKind::PermissionDenied, text));
+    let mode = file.metadata()?.mode() & 0o777;
+    let excess = mode & 0o066 & !readers.mode();
+    let name = path.display();
+    if excess & 0o044 != 0 {
+        return denied(format!(
+            "other users of this host can read it (mode {mode:03o}): run `chmod 600 {name}`, and replace \
+             the secret if they may have read it"
+        ));
+    }
+    if excess != 0 {
+        let narrowed = if readers == Readers::Owner {
+            "600"
+        } else {
+            "go-w"
+        };
+        return denied(format!(
+            "other users of this host can change it (mode {mode:03o}): check its content, then run `chmod \
+             {narrowed} {name}`"
+        ));
+    }
+    // A link may be in another folder than the file.
+    let real = path.canonicalize().ok();
+    for folder in [Some(path), real.as_deref()].into_iter().flatten() {
+        let folder = folder_of(folder);
+        let mode = folder.metadata()?.mode() & 0o7777;
+        // In a sticky folder, such as /tmp, only its owner replaces a file.
+        if mode & 0o002 != 0 && mode & 0o1000 == 0 {
+            let folder = folder.display();
+            return denied(format!(
+                "other users of this host can replace it, because they can write its folder (mode \
+                 {mode:03o}): check its content, then run `chmod o-w {folder}`"
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn check(_: &Path, _: &File, _: Readers) -> io::Result<()> {
+    Ok(())
+}
+
+/// The folder of a file: `.` for a bare name.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+
+    fn set_mode(path: &Path, mode: u32) {
+        assert!(fs::set_permissions(path, fs::Permissions::from_mode(mode)).is_ok());
+    }
+
+    #[test]
+    fn a_secret_is_its_owners_and_what_is_trusted_is_changed_by_its_owner_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        fs::write(&path, "content").unwrap();
+        let denied = |readers, mode, remedy: &str| {
+            set_mode(&path, mode);
+            let error = read(&path, readers, 100).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::PermissionDenied);
+            assert!(error.to_string().contains(remedy), "{error}");
+        };
+        for mode in [0o640, 0o604, 0o620, 0o644, 0o666] {
+            denied(Readers::Owner, mode, "chmod 600 /");
+        }
+        for mode in [0o664, 0o646, 0o666] {
+            denied(Readers::Everyone, mode, "chmod go-w /");
+        }
+        for (readers, mode) in [
+            (Readers::Owner, 0o600),
+            (Readers::Owner, 0o400),
+            (Readers::Group, 0o640),
+            (Readers::Everyone, 0o600),
+            (Readers::Everyone, 0o755),
+        ] {
+            set_mode(&path, mode);
+            assert_eq!(read(&path, readers, 100).unwrap(), b"content");
+        }
+    }
+
+    #[test]
+    fn a_file_in_a_folder_that_others_can_write_is_refused_also_behind_a_link() {
+        let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let [path, link] = [
+            folders[0].path().join("file"),
+            folders[1].path().join("link"),
+        ];
+        fs::write(&path, "content").unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        let reads = || [&path, &link].map(|it| read(it, Readers::Everyone, 100));
+        assert!(reads().iter().all(Result::is_ok));
+        set_mode(folders[0].path(), 0o777);
+        for refused in reads() {
+            let error = refused.unwrap_err().to_string();
+            assert!(error.contains("chmod o-w /"), "{error}");
+        }
+        set_mode(folders[0].path(), 0o1777);
+        assert!(
+            reads().iter().all(Result::is_ok),
+            "only its owner replaces it"
+        );
+        set_mode(folders[1].path(), 0o777);
+        assert!(reads()[0].is_ok() && reads()[1].is_err());
+    }
+
+    #[test]
+    fn a_file_that_is_too_long_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        fs::write(&path, "content").unwrap();
+        assert_eq!(read(&path, Readers::Everyone, 7).unwrap(), b"content");
+        let error = read(&path, Readers::Everyone, 6).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+    }
+}
