@@ -1,8 +1,10 @@
 //! The files of the log: appended to, renamed when full, the oldest removed.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+
+use jaus_files::{Readers, append};
 
 /// Limits of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +38,7 @@ pub(crate) struct LogFile {
 
 impl LogFile {
     pub(crate) fn open(path: &Path, limits: Limits) -> io::Result<Self> {
-        let file = append_to(path)?;
+        let file = append(path, Readers::Owner)?;
         let length = file.metadata()?.len();
         Ok(Self {
             path: path.to_owned(),
@@ -87,7 +89,7 @@ impl LogFile {
                 _ => {}
             }
         }
-        self.file = append_to(&self.path)?;
+        self.file = append(&self.path, Readers::Owner)?;
         self.length = 0;
         Ok(())
     }
@@ -97,18 +99,6 @@ impl LogFile {
         name.push(format!(".{number}"));
         name.into()
     }
-}
-
-/// Opens a file for appending, readable by its owner alone.
-fn append_to(path: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    options.append(true).create(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let file = options.open(path)?;
-    #[cfg(unix)]
-    file.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
-    Ok(file)
 }
 
 #[cfg(test)]
@@ -151,5 +141,27 @@ mod tests {
         drop(LogFile::open(&path, Limits::default()).unwrap());
         let mode = fs::metadata(&path).unwrap().permissions().mode();
         assert_eq!(mode & 0o777, 0o600);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_or_device_is_refused_and_no_mode_is_changed() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        let [victim, link] = ["victim", "audit.jsonl"].map(|name| folder.path().join(name));
+        fs::write(&victim, "").unwrap();
+        fs::set_permissions(&victim, fs::Permissions::from_mode(0o644)).unwrap();
+        std::os::unix::fs::symlink(&victim, &link).unwrap();
+        let modes = || {
+            [Path::new("/dev/null"), &victim]
+                .map(|it| fs::metadata(it).unwrap().permissions().mode())
+        };
+        let before = modes();
+        for path in [Path::new("/dev/null"), &link] {
+            let refused = LogFile::open(path, Limits::default()).unwrap_err();
+            assert_eq!(refused.kind(), io::ErrorKind::InvalidInput, "{refused}");
+        }
+        drop(LogFile::open(&victim, Limits::default()).unwrap());
+        assert_eq!(modes(), before);
     }
 }
