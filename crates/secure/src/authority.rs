@@ -1,6 +1,7 @@
 //! The certificate authority whose certificates a node accepts, and its revocation list.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rustls::pki_types::{
     CertificateDer, CertificateRevocationListDer, TrustAnchor, UnixTime, pem::PemObject as _,
@@ -23,6 +24,9 @@ pub enum Rejection {
     /// The key is not in the trust file.
     #[error("the key {0} is not trusted here")]
     UntrustedKey(PublicKey),
+    /// A file that decides which peers are trusted has become unusable.
+    #[error("new sessions are refused here until a file can be used again: {0}")]
+    UnusableTrust(Arc<str>),
     /// The key has no Ed25519 form.
     #[error("its key is not an Ed25519 key")]
     NotEd25519,

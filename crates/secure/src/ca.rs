@@ -10,12 +10,12 @@
 
 mod register;
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use jaus::address::JausId;
+use jaus_files::{FileLock, Readers};
 use rcgen::{
     BasicConstraints, CertificateParams, CertificateRevocationListParams, DistinguishedName,
     DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyIdMethod, KeyUsagePurpose, PublicKeyData,
@@ -31,7 +31,6 @@ use crate::certificate::{
     Certificate, CertificateError, Defect, MOST_IDS, SCHEME, in_file, is_name, malformed,
     read_certificate,
 };
-use crate::edit;
 use crate::key::{Key, KeyError, PublicKey, pem};
 pub use register::Issued;
 
@@ -194,7 +193,7 @@ impl CertificateAuthority {
         self.write_list(&issued, now)?;
         let text: String = issued.iter().map(Issued::to_string).collect();
         let path = self.register();
-        edit::replace(&path, &text).map_err(|source| in_file(&path, source))?;
+        write(&path, &text)?;
         Ok(revoked)
     }
 
@@ -211,19 +210,19 @@ impl CertificateAuthority {
     }
 
     /// Keeps other programs from changing the register until it is dropped.
-    fn lock(&self) -> Result<File, AuthorityError> {
+    fn lock(&self) -> Result<FileLock, AuthorityError> {
         let path = self.register();
-        edit::lock(&path).map_err(|source| in_file(&path, source).into())
+        FileLock::of(&path).map_err(|source| in_file(&path, source).into())
     }
 
     fn append(&self, issued: &Issued) -> Result<(), AuthorityError> {
         let path = self.register();
-        let append = || -> io::Result<()> {
-            let mut file = OpenOptions::new().append(true).create(true).open(&path)?;
-            file.write_all(issued.to_string().as_bytes())?;
-            file.sync_all()
-        };
-        append().map_err(|source| in_file(&path, source).into())
+        jaus_files::append(&path, Readers::Everyone)
+            .and_then(|mut file| {
+                file.write_all(issued.to_string().as_bytes())?;
+                file.sync_all()
+            })
+            .map_err(|source| in_file(&path, source).into())
     }
 
     /// Writes the list of the revoked certificates. Expired ones stay in it: whether one has expired is a
@@ -241,9 +240,8 @@ impl CertificateAuthority {
             key_identifier_method: KeyIdMethod::Sha256,
         };
         let list = list.signed_by(&self.issuer())?;
-        let path = self.folder.join("ca.crl");
-        edit::replace(&path, &pem("X509 CRL", list.der()))
-            .map_err(|source| in_file(&path, source).into())
+        write(&self.folder.join("ca.crl"), &pem("X509 CRL", list.der()))?;
+        Ok(())
     }
 
     /// The parameters of its own certificate.
@@ -321,7 +319,8 @@ fn time(time: SystemTime) -> OffsetDateTime {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), CertificateError> {
-    fs::write(path, text).map_err(|source| in_file(path, source))
+    jaus_files::replace(path, Readers::Everyone, text.as_bytes())
+        .map_err(|source| in_file(path, source))
 }
 
 impl PublicKeyData for PublicKey {

@@ -1,11 +1,11 @@
 //! Certificates of nodes: X.509, with the name of the node and the ids that it may speak for.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use jaus::address::JausId;
+use jaus_files::Readers;
 use rustls::pki_types::{CertificateDer, UnixTime, pem::PemObject as _};
 use webpki::EndEntityCert;
 use x509_cert::der::{DateTime, Decode as _};
@@ -60,9 +60,6 @@ pub enum CertificateError {
         /// The reason.
         source: io::Error,
     },
-    /// A file is longer than 4 MiB.
-    #[error("the file {} is longer than 4 MiB", .0.display())]
-    TooLong(PathBuf),
     /// A file does not hold what is expected.
     #[error("the file {} contains no {expected} in PEM", .path.display())]
     Malformed {
@@ -236,13 +233,9 @@ pub(crate) fn shown(time: UnixTime) -> String {
     )
 }
 
-/// Reads the octets of a file of bounded length.
+/// Reads a file that others may read, and cannot change.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CertificateError> {
-    let in_file = |source| in_file(path, source);
-    if fs::metadata(path).map_err(in_file)?.len() > LONGEST {
-        return Err(CertificateError::TooLong(path.to_owned()));
-    }
-    fs::read(path).map_err(in_file)
+    jaus_files::read(path, Readers::Everyone, LONGEST).map_err(|source| in_file(path, source))
 }
 
 /// Reads the first certificate of a PEM file.

@@ -10,7 +10,7 @@ use rustls::sign::CertifiedKey;
 
 use crate::authority::{Authority, Rejection};
 use crate::certificate::{Certificate, CertificateError, shown};
-use crate::follow::Followed;
+use crate::follow::{Followed, KEEPING, REFUSING};
 use crate::key::{Key, PublicKey};
 use crate::trust::{Peer, TrustFile};
 
@@ -150,7 +150,8 @@ impl Credentials {
         self.authority.is_some()
     }
 
-    /// Reads all files again. On an error the previous contents of that file stay in force.
+    /// Reads the node's own files and those of its authority again. On an error the previous contents of
+    /// that file stay; with an unusable file of the authority, new sessions are refused.
     ///
     /// # Errors
     /// If a file of keys or certificates cannot be used.
@@ -162,10 +163,10 @@ impl Credentials {
     /// Reads each file again whenever it has changed, as long as the credentials are in use. Must
     /// be called within a tokio runtime.
     pub fn follow(&self) {
-        self.own.follow();
+        self.own.follow(KEEPING);
         self.trust.follow();
         if let Some(authority) = &self.authority {
-            authority.follow();
+            authority.follow(REFUSING);
         }
     }
 
@@ -201,7 +202,22 @@ impl Credentials {
         Arc::new(CertifiedKey::new(vec![shown], own.key.signing()))
     }
 
-    /// The peer that this key or certificate belongs to, if it is accepted now.
+    /// Why no new session is accepted: a file that decides about peers cannot be used, and may lack a
+    /// peer that was revoked.
+    pub(crate) fn fault(&self) -> Option<Arc<str>> {
+        let authority = self.authority.as_ref().and_then(Followed::fault);
+        self.trust.fault().or(authority)
+    }
+
+    /// The peer of a new session, if it is accepted now.
+    pub(crate) fn admit(&self, shown: &CertificateDer<'_>) -> Result<Identified, Rejection> {
+        match self.fault() {
+            Some(fault) => Err(Rejection::UnusableTrust(fault)),
+            None => self.identify(shown),
+        }
+    }
+
+    /// The peer of a session that this key or certificate belongs to, if it is accepted now.
     pub(crate) fn identify(&self, shown: &CertificateDer<'_>) -> Result<Identified, Rejection> {
         let Some(authority) = &self.authority else {
             let key = PublicKey::from_spki(shown).ok_or(Rejection::NotEd25519)?;

@@ -1,12 +1,14 @@
 //! Changes of a trust file: a peer is added or removed, and the rest of the file stays as it is.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
 use std::path::Path;
+
+use jaus_files::{Readers, edit};
 
 use crate::key::PublicKey;
 use crate::rules::Rules;
-use crate::trust::{CERTIFICATE, Grant, Peer, Trust, TrustError, line_of, line_of_grant};
+use crate::trust::{
+    CERTIFICATE, Grant, LONGEST, Peer, Trust, TrustError, in_file, line_of, line_of_grant,
+};
 
 /// Adds a peer to a trust file, which is created if necessary. A name that has a key already gets
 /// another one only if `also` says so.
@@ -133,54 +135,17 @@ fn change(
     change: impl FnOnce(&str) -> Result<Option<String>, TrustError>,
 ) -> Result<bool, TrustError> {
     let failed = |source| in_file(path, source);
-    let _alone = lock(path).map_err(failed)?;
-    let Some(changed) = change(&text_of(path)?)? else {
-        return Ok(false);
-    };
-    Trust::parse(&changed)?;
-    replace(path, &changed).map_err(failed)?;
-    Ok(true)
-}
-
-/// Waits until no other program changes the file, and keeps others waiting until it is dropped. The lock
-/// is that of a file beside it, because the file itself is replaced.
-pub(crate) fn lock(path: &Path) -> io::Result<File> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".lock");
-    let file = File::options()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .open(name)?;
-    file.lock()?;
-    Ok(file)
-}
-
-fn text_of(path: &Path) -> Result<String, TrustError> {
-    match fs::read_to_string(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(String::new()),
-        other => other.map_err(|source| in_file(path, source)),
-    }
-}
-
-/// Replaces a file in one step, so that a reader finds the old or the new text.
-pub(crate) fn replace(path: &Path, text: &str) -> io::Result<()> {
-    let draft = path.with_extension("new");
-    let mut file = File::create(&draft)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    fs::rename(&draft, path)
-}
-
-fn in_file(path: &Path, source: io::Error) -> TrustError {
-    TrustError::File {
-        path: path.to_owned(),
-        source,
-    }
+    edit(path, Readers::Everyone, LONGEST, failed, |text| {
+        let changed = change(text)?;
+        changed.as_deref().map(Trust::parse).transpose()?;
+        Ok(changed)
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn peer(name: &str, octet: u8) -> Peer {
@@ -292,5 +257,42 @@ mod tests {
         assert_eq!(Trust::parse(&text).unwrap().grants(), [console]);
         let refused = revoke(&path, "console", None).unwrap_err().to_string();
         assert!(refused.contains("jaus keys ca revoke console"), "{refused}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn planted_links_lead_no_change_to_another_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, draft, victim] =
+            ["trusted_keys", "trusted_keys.new", "victim"].map(|it| folder.path().join(it));
+        fs::write(&victim, "precious").unwrap();
+        std::os::unix::fs::symlink(&victim, draft).unwrap();
+        trust(&path, &peer("rover", 1), false).unwrap();
+        assert!(fs::symlink_metadata(&path).unwrap().is_file());
+        let linked = folder.path().join("linked");
+        std::os::unix::fs::symlink(&path, &linked).unwrap();
+        let refused = revoke(&linked, "rover", None).unwrap_err().to_string();
+        assert!(refused.contains("symbolic link"), "{refused}");
+        assert_eq!(fs::read(&victim).unwrap(), b"precious");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_key_that_root_revokes_is_revoked_for_the_service_too() {
+        use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        for (name, octet) in [("rover", 1), ("operator", 2)] {
+            trust(&path, &peer(name, octet), false).unwrap();
+        }
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        if chown(&path, Some(65534), Some(65533)).is_err() {
+            return eprintln!("SKIPPED: only root can give a file to another user");
+        }
+        assert!(revoke(&path, "operator", None).unwrap());
+        let found = fs::metadata(&path).unwrap();
+        let found = (found.uid(), found.gid(), found.mode() & 0o777);
+        assert_eq!(found, (65534, 65533, 0o640));
     }
 }

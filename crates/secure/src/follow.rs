@@ -1,13 +1,19 @@
 //! Values that are read from files, shared, and read again when a file has changed.
 
 use std::fmt;
-use std::fs;
 use std::path::PathBuf;
-use std::sync::{Arc, PoisonError, RwLock, Weak};
-use std::time::{Duration, SystemTime};
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard, Weak};
+use std::time::Duration;
+
+use jaus_files::FileStamp;
 
 /// How often a running node looks whether its files have changed.
 const INTERVAL: Duration = Duration::from_secs(1);
+
+/// What an unusable file of trust means: it may lack what was revoked.
+pub(crate) const REFUSING: &str = "new sessions are refused until it can be used again";
+/// What an unusable file of the node itself means.
+pub(crate) const KEEPING: &str = "its previous contents stay in use";
 
 type Read<T, E> = Box<dyn Fn() -> Result<T, E> + Send + Sync>;
 
@@ -15,13 +21,20 @@ type Read<T, E> = Box<dyn Fn() -> Result<T, E> + Send + Sync>;
 pub(crate) struct Followed<T, E>(Arc<Inner<T, E>>);
 
 struct Inner<T, E> {
-    /// The value, and how often it was replaced.
-    state: RwLock<(u64, Arc<T>)>,
+    state: RwLock<State<T>>,
     files: Vec<PathBuf>,
     /// Their state before the value was read first.
-    seen: Changes,
+    seen: Vec<FileStamp>,
     /// Reads the files; `None` for a value that is in none.
     read: Option<Read<T, E>>,
+}
+
+struct State<T> {
+    value: Arc<T>,
+    /// How often the value was replaced.
+    edition: u64,
+    /// Why the files could not be read last.
+    fault: Option<Arc<str>>,
 }
 
 impl<T, E> Followed<T, E> {
@@ -36,42 +49,66 @@ impl<T, E> Followed<T, E> {
         read: impl Fn() -> Result<T, E> + Send + Sync + 'static,
     ) -> Result<Self, E> {
         // A change between the two is noticed later.
-        let seen = changes(&files);
+        let seen = stamps(&files);
         let value = read()?;
         Ok(Self::with(value, files, seen, Some(Box::new(read))))
     }
 
-    fn with(value: T, files: Vec<PathBuf>, seen: Changes, read: Option<Read<T, E>>) -> Self {
+    fn with(value: T, files: Vec<PathBuf>, seen: Vec<FileStamp>, read: Option<Read<T, E>>) -> Self {
         Self(Arc::new(Inner {
-            state: RwLock::new((0, Arc::new(value))),
+            state: RwLock::new(State {
+                value: Arc::new(value),
+                edition: 0,
+                fault: None,
+            }),
             files,
             seen,
             read,
         }))
     }
 
+    fn state(&self) -> RwLockReadGuard<'_, State<T>> {
+        self.0.state.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn state_mut(&self) -> RwLockWriteGuard<'_, State<T>> {
+        self.0.state.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The current value.
     pub(crate) fn get(&self) -> Arc<T> {
-        let state = self.0.state.read().unwrap_or_else(PoisonError::into_inner);
-        state.1.clone()
+        self.state().value.clone()
     }
 
     /// How often the value was replaced.
     pub(crate) fn edition(&self) -> u64 {
-        let state = self.0.state.read().unwrap_or_else(PoisonError::into_inner);
-        state.0
+        self.state().edition
+    }
+
+    /// Why the files could not be read last; `None` if they could.
+    pub(crate) fn fault(&self) -> Option<Arc<str>> {
+        self.state().fault.clone()
     }
 
     /// Replaces the value.
     pub(crate) fn replace(&self, value: T) {
-        let mut state = self.0.state.write().unwrap_or_else(PoisonError::into_inner);
-        *state = (state.0 + 1, Arc::new(value));
+        let mut state = self.state_mut();
+        state.value = Arc::new(value);
+        state.edition += 1;
+        state.fault = None;
     }
+}
 
-    /// Reads the files again. On an error the previous value stays.
+impl<T, E: fmt::Display> Followed<T, E> {
+    /// Reads the files again. On an error the previous value stays, with a [`fault`](Self::fault).
     pub(crate) fn reload(&self) -> Result<(), E> {
-        if let Some(read) = &self.0.read {
-            self.replace(read()?);
+        match self.0.read.as_ref().map(|read| read()) {
+            Some(Ok(value)) => self.replace(value),
+            Some(Err(error)) => {
+                self.state_mut().fault = Some(error.to_string().into());
+                return Err(error);
+            }
+            None => {}
         }
         Ok(())
     }
@@ -82,51 +119,52 @@ where
     T: Send + Sync + 'static,
     E: fmt::Display + 'static,
 {
-    /// Reads the files again whenever one of them has changed, as long as the value is in use. Must
-    /// be called within a tokio runtime. A file that has become unusable changes nothing, and is
-    /// logged.
+    /// Reads the files again whenever one of them has changed, and while they cannot be used, as long as
+    /// the value is in use. Must be called within a tokio runtime. A file that has become unusable is
+    /// logged, with what this means for the node.
     #[expect(
         clippy::disallowed_methods,
         reason = "the task only looks at files, and ends with the value"
     )]
-    pub(crate) fn follow(&self) {
+    pub(crate) fn follow(&self, consequence: &'static str) {
         if self.0.read.is_some() {
-            tokio::spawn(follow(Arc::downgrade(&self.0), self.0.seen.clone()));
+            let seen = self.0.seen.clone();
+            tokio::spawn(follow(Arc::downgrade(&self.0), seen, consequence));
         }
     }
 }
 
-/// When each file was changed last, and its length; `None` if it is not there.
-type Changes = Vec<Option<(SystemTime, u64)>>;
-
-fn changes(files: &[PathBuf]) -> Changes {
-    let change = |path| {
-        let metadata = fs::metadata(path).ok()?;
-        Some((metadata.modified().ok()?, metadata.len()))
-    };
-    files.iter().map(change).collect()
+fn stamps(files: &[PathBuf]) -> Vec<FileStamp> {
+    files.iter().map(|it| FileStamp::of(it)).collect()
 }
 
 #[expect(
     clippy::disallowed_methods,
     reason = "looks at files in real time, also while a test pauses the clock"
 )]
-async fn follow<T, E: fmt::Display>(value: Weak<Inner<T, E>>, mut seen: Changes) {
+async fn follow<T, E: fmt::Display>(
+    value: Weak<Inner<T, E>>,
+    mut seen: Vec<FileStamp>,
+    consequence: &str,
+) {
     loop {
         tokio::time::sleep(INTERVAL).await;
-        let Some(inner) = value.upgrade() else {
+        let Some(value) = value.upgrade().map(Followed) else {
             return;
         };
-        let now = changes(&inner.files);
-        if now == seen {
+        let now = stamps(&value.0.files);
+        let fault = value.fault();
+        // What makes a file usable again may be elsewhere, such as the mode of its folder.
+        if now == seen && fault.is_none() {
             continue;
         }
         seen = now;
-        let files = inner.files.iter().map(|it| it.display().to_string());
+        let files = value.0.files.iter().map(|it| it.display().to_string());
         let files = files.collect::<Vec<_>>().join(", ");
-        match Followed(inner).reload() {
+        match value.reload() {
             Ok(()) => tracing::info!(files, "read again after a change"),
-            Err(error) => tracing::error!(%error, "the previous contents stay in force"),
+            Err(_) if value.fault() == fault => {}
+            Err(error) => tracing::error!(files, %error, "{consequence}"),
         }
     }
 }

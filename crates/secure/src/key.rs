@@ -1,14 +1,15 @@
 //! A node's key: Ed25519, in a file that only its owner can read.
 
 use std::fmt;
-use std::fs::{self, OpenOptions};
-use std::io::{self, Write as _};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use jaus_files::Readers;
 use ring::digest::{Digest, SHA256, digest};
 use ring::rand::SystemRandom;
 use ring::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
@@ -20,6 +21,8 @@ use rustls::sign::SigningKey;
 const SPKI_PREFIX: [u8; 12] = [
     0x30, 0x2A, 0x30, 0x05, 0x06, 0x03, 0x2B, 0x65, 0x70, 0x03, 0x21, 0x00,
 ];
+/// The longest key file, in octets.
+const LONGEST: u64 = 64 << 10;
 /// Characters of a line of PEM.
 const PEM_LINE: usize = 64;
 
@@ -41,18 +44,6 @@ pub enum KeyError {
         .0.display()
     )]
     Exists(PathBuf),
-    /// Other users of the host can read the file.
-    #[error(
-        "the key file {} can be read by other users (mode {mode:03o}): run `chmod 600 {}`; if \
-         they may have read it, make a new key",
-        .path.display(), .path.display()
-    )]
-    Readable {
-        /// The file.
-        path: PathBuf,
-        /// Its permission bits.
-        mode: u32,
-    },
     /// The file does not contain an Ed25519 key.
     #[error("the key file {} contains no Ed25519 private key in PKCS #8 PEM", .0.display())]
     Malformed(PathBuf),
@@ -81,11 +72,12 @@ impl Key {
             .map_err(|_| KeyError::NoRandomness)?;
         let key = Self::from_pkcs8(document.as_ref())
             .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
-        write_new(path, &pem("PRIVATE KEY", document.as_ref())).map_err(|source| {
-            match source.kind() {
-                io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
-                _ => in_file(path, source),
-            }
+        let text = pem("PRIVATE KEY", document.as_ref());
+        jaus_files::create(path, Readers::Owner, text.as_bytes()).map_err(|source| match source
+            .kind()
+        {
+            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
+            _ => in_file(path, source),
         })?;
         Ok(key)
     }
@@ -95,12 +87,12 @@ impl Key {
     /// # Errors
     /// If the file cannot be read, can be read by other users too, or contains no Ed25519 key.
     pub fn load(path: &Path) -> Result<Self, KeyError> {
-        check_mode(path)?;
-        let octets = fs::read(path).map_err(|source| in_file(path, source))?;
-        PrivatePkcs8KeyDer::from_pem_slice(&octets)
-            .ok()
-            .and_then(|der| Self::from_pkcs8(der.secret_pkcs8_der()))
-            .ok_or_else(|| KeyError::Malformed(path.to_owned()))
+        Self::parse(&read(path)?).ok_or_else(|| KeyError::Malformed(path.to_owned()))
+    }
+
+    fn parse(pem: &[u8]) -> Option<Self> {
+        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok()?;
+        Self::from_pkcs8(der.secret_pkcs8_der())
     }
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
@@ -118,15 +110,18 @@ impl Key {
         name.into()
     }
 
-    /// Puts the key of [`next_path`](Self::next_path) in place of the one in `path`. A running node
-    /// notices it within seconds.
+    /// Puts the key of [`next_path`](Self::next_path) in place of the one in `path`. The key file keeps
+    /// its owner and mode, so the running node that reads it notices the new key within seconds.
     ///
     /// # Errors
     /// If the file of the next key cannot be used, or the key file not be replaced.
     pub fn replace_by_next(path: &Path) -> Result<Self, KeyError> {
         let next = Self::next_path(path);
-        let key = Self::load(&next)?;
-        fs::rename(&next, path).map_err(|source| in_file(path, source))?;
+        let text = read(&next)?;
+        let key = Self::parse(&text).ok_or_else(|| KeyError::Malformed(next.clone()))?;
+        jaus_files::replace(path, Readers::Owner, &text).map_err(|source| in_file(path, source))?;
+        // Without the copy, because the next `--finish` would finish nothing.
+        fs::remove_file(&next).map_err(|source| in_file(&next, source))?;
         Ok(key)
     }
 
@@ -269,34 +264,8 @@ fn in_file(path: &Path, source: io::Error) -> KeyError {
     }
 }
 
-fn write_new(path: &Path, text: &str) -> io::Result<()> {
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let mut file = options.open(path)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
-}
-
-/// Refuses a file that its group or other users can read.
-#[cfg(unix)]
-fn check_mode(path: &Path) -> Result<(), KeyError> {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    let metadata = fs::metadata(path).map_err(|source| in_file(path, source))?;
-    match metadata.permissions().mode() & 0o777 {
-        mode if mode & 0o077 != 0 => Err(KeyError::Readable {
-            path: path.to_owned(),
-            mode,
-        }),
-        _ => Ok(()),
-    }
-}
-
-#[cfg(not(unix))]
-fn check_mode(_: &Path) -> Result<(), KeyError> {
-    Ok(())
+fn read(path: &Path) -> Result<Vec<u8>, KeyError> {
+    jaus_files::read(path, Readers::Owner, LONGEST).map_err(|source| in_file(path, source))
 }
 
 #[cfg(test)]
@@ -388,5 +357,35 @@ mod tests {
         ] {
             assert!(text.parse::<PublicKey>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn the_next_key_replaces_the_first_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        Key::create(&path).unwrap();
+        let next = Key::create(&Key::next_path(&path)).unwrap().public();
+        assert_eq!(Key::replace_by_next(&path).unwrap().public(), next);
+        assert_eq!(Key::load(&path).unwrap().public(), next);
+        assert!(Key::replace_by_next(&path).is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_key_that_root_replaces_stays_the_services() {
+        use std::os::unix::fs::{MetadataExt as _, chown};
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        Key::create(&path).unwrap();
+        Key::create(&Key::next_path(&path)).unwrap();
+        if chown(&path, Some(65534), Some(65534)).is_err() {
+            return eprintln!("SKIPPED: only root can give a file to another user");
+        }
+        Key::replace_by_next(&path).unwrap();
+        let found = fs::metadata(&path).unwrap();
+        let found = (found.uid(), found.gid(), found.mode() & 0o777);
+        assert_eq!(found, (65534, 65534, 0o600));
     }
 }

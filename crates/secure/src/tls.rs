@@ -115,7 +115,7 @@ fn client(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicClientC
 
 impl Verifier {
     fn check(&self, shown: &CertificateDer<'_>) -> Result<(), Error> {
-        let identified = self.credentials.identify(shown);
+        let identified = self.credentials.admit(shown);
         identified.map(|_| ()).map_err(|it| self.refuse(it))
     }
 

@@ -14,22 +14,23 @@
 //! no line for a peer; a line with the word `certificate` in place of the key narrows the ids of the
 //! certificate with that name, and grants it rules.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use jaus::address::JausId;
+use jaus_files::Readers;
 
 use crate::certificate::Certificate;
-use crate::follow::Followed;
+use crate::follow::{Followed, REFUSING};
 use crate::key::{KeyError, PublicKey};
 use crate::rules::{RuleError, Rules};
 
 /// What stands in place of the key in a line for a certificate.
 pub(crate) const CERTIFICATE: &str = "certificate";
 /// The longest trust file, in octets: some ten thousand keys.
-const LONGEST: u64 = 1 << 20;
+pub(crate) const LONGEST: u64 = 1 << 20;
 
 /// Why a trust file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -43,9 +44,14 @@ pub enum TrustError {
         /// The reason.
         source: io::Error,
     },
-    /// The file is longer than 1 MiB.
-    #[error("the trust file {} is longer than 1 MiB", .0.display())]
-    TooLong(PathBuf),
+    /// The file has a malformed line.
+    #[error("the trust file {}, {source}", .path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The line, and what is wrong.
+        source: Box<Self>,
+    },
     /// A line lacks a part.
     #[error("line {line}: write a name, a public key and the ids, such as `rover KEY 101.255.255`")]
     Parts {
@@ -346,7 +352,8 @@ impl TrustFile {
         Followed::load(vec![path.to_owned()], read).map(Self)
     }
 
-    /// Reads the file again. On an error the previous trust stays in force.
+    /// Reads the file again. On an error the previous trust stays, and new sessions are refused until
+    /// the file can be read again.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -355,9 +362,15 @@ impl TrustFile {
     }
 
     /// Reads the file again whenever it has changed, as long as the trust is in use. Must be called
-    /// within a tokio runtime. A file that has become unusable changes nothing, and is logged.
+    /// within a tokio runtime. A file that has become unusable is logged, and has the effect of
+    /// [`reload`](Self::reload) with an error.
     pub fn follow(&self) {
-        self.0.follow();
+        self.0.follow(REFUSING);
+    }
+
+    /// Why new sessions are refused: the file has become unusable.
+    pub(crate) fn fault(&self) -> Option<Arc<str>> {
+        self.0.fault()
     }
 
     /// Replaces the trust.
@@ -401,18 +414,25 @@ impl TrustFile {
 }
 
 fn read(path: &Path) -> Result<Trust, TrustError> {
-    let in_file = |source| TrustError::File {
+    let text = jaus_files::read_text(path, Readers::Everyone, LONGEST);
+    let text = text.map_err(|source| in_file(path, source))?;
+    Trust::parse(&text).map_err(|source| TrustError::Malformed {
+        path: path.to_owned(),
+        source: Box::new(source),
+    })
+}
+
+pub(crate) fn in_file(path: &Path, source: io::Error) -> TrustError {
+    TrustError::File {
         path: path.to_owned(),
         source,
-    };
-    if fs::metadata(path).map_err(in_file)?.len() > LONGEST {
-        return Err(TrustError::TooLong(path.to_owned()));
     }
-    Trust::parse(&fs::read_to_string(path).map_err(in_file)?)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn key(octet: u8) -> PublicKey {
@@ -471,16 +491,39 @@ mod tests {
     }
 
     #[test]
-    fn a_reload_with_an_error_leaves_the_trust_in_force() {
+    fn a_reload_with_an_error_leaves_the_trust_of_sessions_and_refuses_new_ones() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trusted_keys");
         fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
         let file = TrustFile::load(&path).unwrap();
         fs::write(&path, "rover\n").unwrap();
+        assert_eq!(file.fault(), None);
         assert!(file.reload().is_err());
         assert!(file.find(key(1)).is_some());
+        let fault = file.fault().unwrap();
+        let named = format!("the trust file {}, line 1: ", path.display());
+        assert!(fault.starts_with(&named), "{fault}");
         fs::write(&path, "").unwrap();
         file.reload().unwrap();
         assert!(file.find(key(1)).is_none());
+        assert_eq!(file.fault(), None);
+    }
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_others_can_change_is_refused_with_the_remedy() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
+        for (mode, is_refused) in [(0o666, true), (0o664, true), (0o644, false), (0o600, false)] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            let loaded = TrustFile::load(&path);
+            assert_eq!(loaded.is_err(), is_refused, "{mode:o}");
+            if let Err(error) = loaded {
+                let error = error.to_string();
+                assert!(error.contains("chmod go-w /"), "{error}");
+            }
+        }
     }
 }

@@ -4,6 +4,8 @@ use rustls::pki_types::UnixTime;
 use rustls::pki_types::pem::PemObject as _;
 use tempfile::TempDir;
 
+use std::fs;
+
 use super::*;
 use crate::authority::{Authority, Rejection};
 

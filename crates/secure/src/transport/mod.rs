@@ -82,6 +82,8 @@ pub struct Transport {
     credentials: Credentials,
     /// The edition of the trust with which the sessions were last compared.
     edition: u64,
+    /// Why new sessions are refused, as last reported.
+    fault: Option<Arc<str>>,
     /// The edition of the own key and certificate in use.
     own_edition: u64,
     refusals: Refusals,
@@ -126,6 +128,7 @@ impl Transport {
         Self {
             own,
             edition: credentials.trust_edition(),
+            fault: None,
             own_edition,
             credentials,
             refusals,
@@ -358,7 +361,7 @@ impl Transport {
             return;
         };
         // The handshake has accepted it, but the trust may have changed meanwhile.
-        let identified = match session.identify(&self.credentials) {
+        let identified = match session.identify(|shown| self.credentials.admit(shown)) {
             Ok(identified) => identified,
             Err(rejection) => {
                 tracing::warn!(%rejection, "refused after the handshake");

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::session::Session;
 use super::{Counter, Transport, code, parameters};
 
 /// The interval of warnings about the node's own certificate.
@@ -38,6 +39,7 @@ impl Transport {
 
     /// Closes the sessions of peers that are no longer accepted, and applies changes of ids.
     pub(super) fn apply_trust(&mut self, now: Instant) {
+        self.report_fault();
         let (edition, wall) = (self.credentials.trust_edition(), self.credentials.now());
         let changed = edition != self.edition;
         self.edition = edition;
@@ -47,7 +49,7 @@ impl Transport {
             if session.established().is_none() || !(changed || expired) {
                 continue;
             }
-            match session.identify(&self.credentials) {
+            match session.identify(|shown| self.credentials.identify(shown)) {
                 Ok(identified) => session.peer = Some(identified.peer),
                 Err(rejection) => {
                     tracing::warn!(%rejection, "the session ends");
@@ -58,6 +60,30 @@ impl Transport {
         for id in refused {
             self.end(now, id, code::REVOKED, NOT_ACCEPTED);
         }
+    }
+
+    /// Says when new sessions begin or cease to be refused, and whom that leaves connected: a peer that was
+    /// to be revoked may be among them.
+    fn report_fault(&mut self) {
+        let fault = self.credentials.fault();
+        if fault == self.fault {
+            return;
+        }
+        let peers = self.sessions.values().filter_map(Session::established);
+        let peers: Vec<_> = peers.map(|it| it.name.as_str()).collect();
+        let connected = match peers[..] {
+            [] => "nobody".to_owned(),
+            _ => peers.join(", "),
+        };
+        match &fault {
+            Some(reason) => tracing::error!(
+                connected,
+                "new secure sessions are refused, because {reason}; those of the connected peers remain, \
+                 also of one that was to be revoked: make the file usable, or stop the node"
+            ),
+            None => tracing::info!(connected, "new secure sessions are accepted again"),
+        }
+        self.fault = fault;
     }
 
     /// Warns of a certificate of the node that expires soon.

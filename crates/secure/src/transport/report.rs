@@ -21,6 +21,7 @@ jaus::counters! {
     /// Handshakes refused by this side for another defect of the certificate, its authority, or
     /// the proof of its key.
     RefusedCertificates = "handshakes refused: certificate or proof of its key not valid",
+    RefusedUnusableTrust = "handshakes refused: a file of trust cannot be used",
     /// First packets ignored because too many came from one address, or too many handshakes were
     /// unfinished.
     HandshakesDropped = "handshakes refused: too many from one address or unfinished",
@@ -47,6 +48,7 @@ impl Counters {
         self.add(match rejection {
             Rejection::UntrustedKey(_) | Rejection::NotEd25519 => Counter::RefusedKeys,
             Rejection::Expired { .. } | Rejection::NotYetValid { .. } => Counter::RefusedTimes,
+            Rejection::UnusableTrust(_) => Counter::RefusedUnusableTrust,
             Rejection::Revoked { .. } => Counter::RefusedRevoked,
             _ => Counter::RefusedCertificates,
         });

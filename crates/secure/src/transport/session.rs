@@ -17,7 +17,7 @@ use rustls::pki_types::{CertificateDer, UnixTime};
 
 use super::inlet::{Inlet, framed};
 use crate::authority::Rejection;
-use crate::credentials::{Credentials, Identified};
+use crate::credentials::Identified;
 use crate::trust::Peer;
 
 /// Limits of what waits for one session.
@@ -123,11 +123,14 @@ impl Session {
     }
 
     /// The peer that the key or certificate of the handshake belongs to, if it is accepted now.
-    pub(super) fn identify(&self, credentials: &Credentials) -> Result<Identified, Rejection> {
+    pub(super) fn identify(
+        &self,
+        accept: impl FnOnce(&CertificateDer<'_>) -> Result<Identified, Rejection>,
+    ) -> Result<Identified, Rejection> {
         let identity = self.connection.crypto_session().peer_identity();
         let shown = identity.and_then(|it| it.downcast::<Vec<CertificateDer<'static>>>().ok());
         let first = shown.as_ref().and_then(|it| it.first());
-        credentials.identify(first.ok_or(Rejection::NotEd25519)?)
+        accept(first.ok_or(Rejection::NotEd25519)?)
     }
 
     /// Whether this side has dialled, and the peer has not accepted its key yet.

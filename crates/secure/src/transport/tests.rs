@@ -267,6 +267,39 @@ fn a_revoked_key_loses_its_session_and_gets_no_other() {
 }
 
 #[test]
+fn with_an_unusable_trust_file_sessions_remain_and_no_other_is_accepted_until_it_is_mended() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trusted_keys");
+    let keys = [key(), key(), key()];
+    let good = format!(
+        "operator {} 60.255.255\ntablet {} 61.255.255\n",
+        keys[1].public(),
+        keys[2].public()
+    );
+    std::fs::write(&path, &good).unwrap();
+    let trust = TrustFile::load(&path).unwrap();
+    let rover = trusting([peer("rover", &keys[0], "101.255.255")]);
+    let mut network = Network::new();
+    network.add(&keys[0], &trust, &[]);
+    network.add(&keys[1], &rover, &[address(1)]);
+    network.run(SECOND);
+    assert!(network.session(1).is_some());
+
+    std::fs::write(&path, "operator\n").unwrap();
+    trust.reload().unwrap_err();
+    network.add(&keys[2], &rover, &[address(1)]);
+    network.run(5 * SECOND);
+    assert!(network.session(1).is_some() && network.session(2).is_none());
+    assert!(network.count(0, Counter::RefusedUnusableTrust) > 0);
+
+    std::fs::write(&path, &good).unwrap();
+    trust.reload().unwrap();
+    network.run(30 * SECOND);
+    assert!(network.session(1).is_some() && network.session(2).is_some());
+    assert_eq!(network.count(0, Counter::SessionsEstablished), 2);
+}
+
+#[test]
 fn other_ids_of_a_trusted_key_take_effect_on_its_session() {
     let (mut network, trust, keys) = vehicle_and_operator();
     trust[0].replace(Trust::new(vec![peer("operator", &keys[1], "61.255.255")]));
