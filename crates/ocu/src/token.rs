@@ -1,10 +1,11 @@
 //! The secret that an operator shows before the vehicle obeys.
 
 use std::fmt;
-use std::fs;
 use std::hint::black_box;
-use std::io::{self, Write as _};
+use std::io;
 use std::path::Path;
+
+use jaus_files::Readers;
 
 /// Access token of an operator: from a file, or generated.
 ///
@@ -37,12 +38,6 @@ pub enum TokenError {
         /// The cause.
         source: io::Error,
     },
-    /// Other users of the host can read the file.
-    #[error("the token file {file} can be read by other users of this host: remove it")]
-    Readable {
-        /// The file.
-        file: String,
-    },
     /// The content is unsuitable as a token.
     #[error(
         "the token file {file} holds {length} characters: write one line of {} to {} letters and \
@@ -66,17 +61,20 @@ impl Token {
     pub const SHORTEST: usize = 16;
     /// Maximum length of a token.
     pub const LONGEST: usize = 256;
+    /// The longest file of a token with blanks around it, in octets.
+    const LONGEST_FILE: u64 = 4096;
     /// Random octets in a generated token.
     const RANDOM: usize = 16;
 
     /// Reads the token from a file of one line.
     ///
     /// # Errors
-    /// If the file cannot be read, or its content is too short, too long, or contains characters
+    /// If the file cannot be read, other users of this host can read it, or its content is too short, too long, or contains characters
     /// other than letters, digits and `-._~`.
     pub fn read(file: &Path) -> Result<Self, TokenError> {
         let name = || file.display().to_string();
-        let text = fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
+        let text = jaus_files::read_text(file, Readers::Owner, Self::LONGEST_FILE);
+        let text = text.map_err(|source| TokenError::Unreadable {
             file: name(),
             source,
         })?;
@@ -108,18 +106,11 @@ impl Token {
         };
         if !file.try_exists().map_err(failed)? {
             let token = Self::generate()?;
-            let draft = file.with_extension(format!("new-{}", Self::generate()?.0));
-            let written = write_for_owner(&draft, token.reveal());
-            // Unlike a renamed file, a link replaces none.
-            let linked = written.and_then(|()| match fs::hard_link(&draft, file) {
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
-                other => other,
-            });
-            // A draft that stays does no harm.
-            let _ = fs::remove_file(&draft);
-            linked.map_err(failed)?;
+            match jaus_files::create(file, Readers::Owner, token.reveal().as_bytes()) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                created => created.map_err(failed)?,
+            }
         }
-        check_mode(file)?;
         Self::read(file)
     }
 
@@ -149,38 +140,6 @@ impl Token {
     pub fn reveal(&self) -> &str {
         &self.0
     }
-}
-
-/// Writes a file that only its owner can read.
-fn write_for_owner(file: &Path, text: &str) -> io::Result<()> {
-    let mut options = fs::OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let mut file = options.open(file)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
-}
-
-/// Refuses a file that other users of the host can read: they may know its token already.
-#[cfg(unix)]
-fn check_mode(file: &Path) -> Result<(), TokenError> {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    let name = || file.display().to_string();
-    let metadata = fs::metadata(file).map_err(|source| TokenError::Unreadable {
-        file: name(),
-        source,
-    })?;
-    match metadata.permissions().mode() & 0o077 {
-        0 => Ok(()),
-        _ => Err(TokenError::Readable { file: name() }),
-    }
-}
-
-#[cfg(not(unix))]
-fn check_mode(_: &Path) -> Result<(), TokenError> {
-    Ok(())
 }
 
 impl fmt::Debug for Token {
@@ -224,6 +183,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_kept_token_is_the_same_at_the_next_start_and_for_its_owner_alone() {
+        use std::fs;
         use std::os::unix::fs::PermissionsExt as _;
 
         let folder = tempfile::tempdir().unwrap();
@@ -240,11 +200,13 @@ mod tests {
             0o600
         );
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        mode(0o640);
-        assert!(matches!(
-            Token::keep(&file),
-            Err(TokenError::Readable { .. })
-        ));
+        for readable in [0o640, 0o644] {
+            mode(readable);
+            for refused in [Token::keep(&file), Token::read(&file)] {
+                let error = refused.unwrap_err().to_string();
+                assert!(error.contains("chmod 600 /"), "{error}");
+            }
+        }
     }
 
     #[test]

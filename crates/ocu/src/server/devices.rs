@@ -2,15 +2,15 @@
 //! wrong guesses of others do not delay them, also after a restart.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use blake2::{Blake2s256, Digest as _};
+use jaus_files::Readers;
 
 use crate::token::Token;
-use crate::users::{self, User, Users};
+use crate::users::{User, Users};
 
 /// A user's device: a hash of the user's name and the secret of the cookie, which is random. With the
 /// file of these nobody makes a cookie.
@@ -103,18 +103,18 @@ impl Devices {
             return;
         }
         if let Some(file) = &self.file
-            && let Err(error) = users::replace(file, &text_of(&known))
+            && let Err(error) =
+                jaus_files::replace(file, Readers::Owner, text_of(&known).as_bytes())
         {
-            tracing::warn!("the devices of users are forgotten at the next start: {error}");
+            let file = file.display();
+            tracing::warn!("the devices of users are forgotten at the next start: {file}: {error}");
         }
     }
 }
 
-fn read(file: &PathBuf) -> io::Result<Vec<Device>> {
-    if fs::metadata(file)?.len() > Devices::LONGEST_FILE {
-        return Err(io::Error::other("it is too long"));
-    }
-    let text = fs::read_to_string(file)?;
+fn read(file: &Path) -> io::Result<Vec<Device>> {
+    // Hashes of random secrets may be read; only a line more would be harmful.
+    let text = jaus_files::read_text(file, Readers::Everyone, Devices::LONGEST_FILE)?;
     Ok(text.lines().filter_map(device).collect())
 }
 
@@ -148,6 +148,8 @@ fn text_of(known: &[Device]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::users::UserRole;
     use crate::users::tests::users;

@@ -1,10 +1,9 @@
 //! A key and a certificate signed by it, for a station without a certificate of an authority.
 
-use std::fs::OpenOptions;
-use std::io::{self, Write as _};
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
+use jaus_files::{Readers, create};
 use rcgen::{CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, KeyPair};
 
 use super::error::{TlsError, in_file};
@@ -25,8 +24,8 @@ pub(super) fn make(
     let pair = KeyPair::generate().map_err(TlsError::Make)?;
     let params = params(names, now).map_err(TlsError::Make)?;
     let signed = params.self_signed(&pair).map_err(TlsError::Make)?;
-    write_new(key, &pair.serialize_pem(), 0o600).map_err(in_file(key))?;
-    write_new(certificate, &signed.pem(), 0o644).map_err(in_file(certificate))
+    create(key, Readers::Owner, pair.serialize_pem().as_bytes()).map_err(in_file(key))?;
+    create(certificate, Readers::Everyone, signed.pem().as_bytes()).map_err(in_file(certificate))
 }
 
 fn params(names: &[String], now: SystemTime) -> Result<CertificateParams, rcgen::Error> {
@@ -46,17 +45,4 @@ fn params(names: &[String], now: SystemTime) -> Result<CertificateParams, rcgen:
     let name = "jaus-ocu, operator station";
     params.distinguished_name.push(DnType::CommonName, name);
     Ok(params)
-}
-
-/// Writes a new file with these permission bits.
-fn write_new(path: &Path, text: &str, mode: u32) -> io::Result<()> {
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
-    #[cfg(not(unix))]
-    let _ = mode;
-    let mut file = options.open(path)?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
 }

@@ -15,18 +15,6 @@ pub enum TlsError {
         /// The reason.
         source: io::Error,
     },
-    /// Other users of the host can read the key.
-    #[error(
-        "the key file {} can be read by other users (mode {mode:03o}): run `chmod 600 {}`; if they \
-         may have read it, make a new key and certificate",
-        .path.display(), .path.display()
-    )]
-    Readable {
-        /// The file.
-        path: PathBuf,
-        /// Its permission bits.
-        mode: u32,
-    },
     /// The file contains no certificate.
     #[error(
         "{} contains no certificate in PEM: it must begin with -----BEGIN CERTIFICATE-----, the \

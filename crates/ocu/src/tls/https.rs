@@ -1,11 +1,11 @@
 //! The certificate and key with which the station serves the page, and what is wrong with them.
 
-use std::fs;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::SystemTime;
 
+use jaus_files::Readers;
 use ring::digest;
 use rustls::ServerConfig;
 use rustls::pki_types::pem::PemObject as _;
@@ -17,6 +17,9 @@ use tokio_rustls::server::TlsStream;
 
 use super::certificate;
 use super::error::{TlsError, in_file};
+
+/// The longest file of certificates or a key, in octets.
+const LONGEST: u64 = 1 << 20;
 
 /// TLS 1.3 of the page: a certificate and its key.
 #[derive(Clone)]
@@ -116,35 +119,14 @@ impl std::fmt::Debug for Tls {
 }
 
 fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
-    let text = fs::read(path).map_err(in_file(path))?;
+    let text = jaus_files::read(path, Readers::Everyone, LONGEST).map_err(in_file(path))?;
     let chain: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&text).collect();
     chain.map_err(|_| TlsError::NoCertificate(path.to_owned()))
 }
 
 fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, TlsError> {
-    check_mode(path)?;
-    let text = fs::read(path).map_err(in_file(path))?;
+    let text = jaus_files::read(path, Readers::Owner, LONGEST).map_err(in_file(path))?;
     PrivateKeyDer::from_pem_slice(&text).map_err(|_| TlsError::NoKey(path.to_owned()))
-}
-
-/// Refuses a key that its group or other users can read.
-#[cfg(unix)]
-fn check_mode(path: &Path) -> Result<(), TlsError> {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    let metadata = fs::metadata(path).map_err(in_file(path))?;
-    match metadata.permissions().mode() & 0o777 {
-        mode if mode & 0o077 != 0 => Err(TlsError::Readable {
-            path: path.to_owned(),
-            mode,
-        }),
-        _ => Ok(()),
-    }
-}
-
-#[cfg(not(unix))]
-fn check_mode(_: &Path) -> Result<(), TlsError> {
-    Ok(())
 }
 
 /// Refuses a certificate that has expired or is not valid yet. Whether it is trusted is up to the
@@ -181,9 +163,9 @@ fn fingerprint(certificate: &CertificateDer<'_>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
+    use std::fs;
     use std::path::PathBuf;
+    use std::time::Duration;
 
     use super::*;
 

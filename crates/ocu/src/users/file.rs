@@ -1,10 +1,10 @@
 //! The users file of a running station.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::SystemTime;
+
+use jaus_files::{FileStamp, Readers};
 
 use super::{User, UserRole, Users};
 
@@ -20,20 +20,6 @@ pub enum UsersError {
         /// The reason.
         source: io::Error,
     },
-    /// Other users of the host can read the file.
-    #[error(
-        "the users file {} can be read by other users of this host (mode {mode:03o}): run `chmod \
-         600 {}`", .path.display(), .path.display()
-    )]
-    Readable {
-        /// The file.
-        path: PathBuf,
-        /// Its permission bits.
-        mode: u32,
-    },
-    /// The file is longer than 256 KiB.
-    #[error("the users file {} is longer than 256 KiB", .0.display())]
-    TooLong(PathBuf),
     /// A line is malformed.
     #[error("line {line}: {source}")]
     Line {
@@ -95,7 +81,7 @@ impl UsersError {
 }
 
 /// The longest users file, in octets.
-const LONGEST: u64 = 256 << 10;
+pub(super) const LONGEST: u64 = 256 << 10;
 
 /// The users of a running station. Clones share them.
 #[derive(Clone, Debug)]
@@ -107,11 +93,8 @@ pub struct UsersFile {
 #[derive(Debug)]
 struct Content {
     users: Arc<Users>,
-    edition: Edition,
+    stamp: FileStamp,
 }
-
-/// Time of the last change and length of a file; `None` if it is not there.
-type Edition = Option<(SystemTime, u64)>;
 
 impl UsersFile {
     /// Reads a users file.
@@ -119,11 +102,11 @@ impl UsersFile {
     /// # Errors
     /// If it cannot be read, can be read by other users of this host, or has a malformed line.
     pub fn load(path: &Path) -> Result<Self, UsersError> {
-        let edition = edition(path);
+        let stamp = FileStamp::of(path);
         let users = Arc::new(read(path)?);
         Ok(Self {
             path: path.into(),
-            content: Arc::new(Mutex::new(Content { users, edition })),
+            content: Arc::new(Mutex::new(Content { users, stamp })),
         })
     }
 
@@ -140,53 +123,26 @@ impl UsersFile {
     /// # Errors
     /// As [`load`](Self::load), once for each change.
     pub fn refresh(&self) -> Result<bool, UsersError> {
-        let edition = edition(&self.path);
+        let stamp = FileStamp::of(&self.path);
         let mut content = self.content.lock().unwrap_or_else(PoisonError::into_inner);
-        if content.edition == edition {
+        if content.stamp == stamp {
             return Ok(false);
         }
-        content.edition = edition;
+        content.stamp = stamp;
         content.users = Arc::new(read(&self.path)?);
         Ok(true)
     }
 }
 
-fn edition(path: &Path) -> Edition {
-    let metadata = fs::metadata(path).ok()?;
-    Some((metadata.modified().ok()?, metadata.len()))
-}
-
 fn read(path: &Path) -> Result<Users, UsersError> {
-    let metadata = fs::metadata(path).map_err(|source| UsersError::in_file(path, source))?;
-    if metadata.len() > LONGEST {
-        return Err(UsersError::TooLong(path.to_owned()));
-    }
-    check_mode(path, &metadata)?;
-    let text = fs::read_to_string(path).map_err(|source| UsersError::in_file(path, source))?;
-    Users::parse(&text)
-}
-
-/// Refuses a file that other users of the host can read: they could search for the passwords.
-#[cfg(unix)]
-fn check_mode(path: &Path, metadata: &fs::Metadata) -> Result<(), UsersError> {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    match metadata.permissions().mode() & 0o777 {
-        mode if mode & 0o077 != 0 => Err(UsersError::Readable {
-            path: path.to_owned(),
-            mode,
-        }),
-        _ => Ok(()),
-    }
-}
-
-#[cfg(not(unix))]
-fn check_mode(_: &Path, _: &fs::Metadata) -> Result<(), UsersError> {
-    Ok(())
+    let text = jaus_files::read_text(path, Readers::Owner, LONGEST);
+    Users::parse(&text.map_err(|source| UsersError::in_file(path, source))?)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::tests::user;
     use super::super::{add, remove};
     use super::*;

@@ -18,7 +18,6 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-pub(crate) use self::edit::replace;
 pub use self::edit::{add, remove};
 pub use self::file::{UsersError, UsersFile};
 pub use self::password::{PasswordError, PasswordHash};
