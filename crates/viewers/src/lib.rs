@@ -30,7 +30,7 @@ pub use black_box::{
 pub use channels::{Channel, Channels, MOST_CHANNELS, Sample, nanoseconds};
 pub use frames::FRAMES_TOPIC;
 pub use mcap::{McapRecorder, McapSummary};
-pub use recorder::{Recorder, RecordingFormat, recording_file_options};
+pub use recorder::{Recorder, RecordingFormat};
 pub use recording::{Recording, RecordingError};
 pub use schema::Schema;
 pub use server::{MOST_CLIENTS, Server, ServerSettings, Sharing};

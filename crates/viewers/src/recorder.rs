@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::Path;
 use std::str::FromStr;
@@ -60,17 +59,6 @@ impl FromStr for RecordingFormat {
             _ => Err("write pcapng or mcap"),
         }
     }
-}
-
-/// Options that open the file of a recording for writing. A new file can be read by its owner and
-/// group only, because it has all that operators and vehicles send each other.
-#[must_use]
-pub fn recording_file_options() -> OpenOptions {
-    let mut options = OpenOptions::new();
-    options.write(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o640);
-    options
 }
 
 /// Writes frames to a recording.

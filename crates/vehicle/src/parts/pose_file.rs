@@ -6,8 +6,8 @@ use std::fmt::Write;
 use std::io;
 use std::path::Path;
 
-use tokio::fs::{self, File};
-use tokio::io::AsyncWriteExt;
+use jaus_files::Readers;
+use tokio::fs;
 
 use super::PartError;
 use crate::motion::{Pose, WheelCount};
@@ -114,24 +114,15 @@ pub(super) async fn read(file: &Path) -> Result<Option<Kept>, PartError> {
 
 /// Replaces the file.
 pub(super) async fn write(file: &Path, kept: &Kept) -> Result<(), PartError> {
-    let written = replace(file, &kept.text()).await;
-    written.map_err(|error| {
+    let (path, text) = (file.to_owned(), kept.text());
+    let replace = move || jaus_files::replace(&path, Readers::Everyone, text.as_bytes());
+    let written = tokio::task::spawn_blocking(replace).await;
+    written.map_err(io::Error::from).flatten().map_err(|error| {
         PartError::Broken(format!(
             "cannot save the pose to {}: {error}",
             file.display()
         ))
     })
-}
-
-async fn replace(file: &Path, text: &str) -> io::Result<()> {
-    let mut name = file.as_os_str().to_owned();
-    name.push(".new");
-    let new = Path::new(&name);
-    let mut writer = File::create(new).await?;
-    writer.write_all(text.as_bytes()).await?;
-    // Without this, a power cut after the rename could leave an empty file.
-    writer.sync_data().await?;
-    fs::rename(new, file).await
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use jaus_files::{FileDraft, Readers};
+use redb::backends::FileBackend;
 use redb::{
     Builder, Database, DatabaseError, ReadableDatabase, ReadableTable, StorageBackend,
     TableDefinition, TableError, WriteTransaction,
@@ -165,15 +167,11 @@ impl File {
         let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
         let directory = directory.unwrap_or(Path::new("."));
         fs::create_dir_all(directory).map_err(|error| OpenError::io(directory, error))?;
-        let mut unfinished = path.as_os_str().to_owned();
-        unfinished.push(".new");
-        match fs::remove_file(&unfinished) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(fail(error)),
-            _ => {}
-        }
-        let made = Self::check(path, builder().create(&unfinished))?;
-        fs::rename(&unfinished, path).map_err(fail)?;
-        sync(directory).map_err(fail)?;
+        let mut draft = FileDraft::new(path, Readers::Everyone).map_err(fail)?;
+        let file = draft.file().try_clone().map_err(fail)?;
+        let database = FileBackend::new(file).and_then(|it| builder().create_with_backend(it));
+        let made = Self::check(path, database)?;
+        draft.replace().map_err(fail)?;
         Ok(made)
     }
 
@@ -424,12 +422,4 @@ fn whole(tile: &[u8]) -> Result<&[u8], KeepError> {
     } else {
         Err(KeepError::record(&"a tile has a wrong size"))
     }
-}
-
-/// Flushes the directory entry to disk. Needed and supported only on Unix.
-fn sync(directory: &Path) -> io::Result<()> {
-    if cfg!(unix) {
-        fs::File::open(directory)?.sync_all()?;
-    }
-    Ok(())
 }

@@ -467,14 +467,13 @@ fn a_damaged_store_is_refused_and_an_open_one_is_not_opened_twice() {
 }
 
 #[test]
-fn what_a_power_cut_left_of_a_new_file_is_no_obstacle() {
-    let directory = Directory::new("unfinished");
+fn a_new_store_is_alone_in_its_folder() {
+    let directory = Directory::new("draft");
     let file = directory.file();
-    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-    let unfinished = file.with_extension("redb.new");
-    std::fs::write(&unfinished, b"half a header").unwrap();
     World::open(&file).unwrap();
-    assert!(!unfinished.exists());
+    let names = std::fs::read_dir(file.parent().unwrap()).unwrap();
+    let names: Vec<_> = names.map(|it| it.unwrap().path()).collect();
+    assert_eq!(names, [file]);
 }
 
 #[test]

@@ -9,8 +9,6 @@
     reason = "a test with sockets"
 )]
 
-use std::path::PathBuf;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use jaus::component::State;
@@ -264,19 +262,6 @@ async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
         .await;
 }
 
-/// Unblocks a writer that waits for a reader of this file, so that a failed test ends.
-struct Stall(PathBuf);
-
-impl Drop for Stall {
-    fn drop(&mut self) {
-        let file = self.0.clone();
-        if file.exists() {
-            std::thread::spawn(move || std::fs::read(file));
-            std::thread::sleep(Duration::from_millis(500));
-        }
-    }
-}
-
 /// Milliseconds since midnight.
 fn milliseconds(stamp: TimeStamp) -> i64 {
     let minutes = i64::from(stamp.hour()) * 60 + i64::from(stamp.minutes());
@@ -284,24 +269,34 @@ fn milliseconds(stamp: TimeStamp) -> i64 {
 }
 
 // In real time, as the disk is.
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_stamps() {
-    let directory = std::env::temp_dir().join(format!("jaus-stall-{}", std::process::id()));
-    std::fs::create_dir_all(&directory).unwrap();
-    let file: PathBuf = directory.join("pose.toml");
-    // The sensor writes a new file beside the old one. Opening this pipe blocks until it is also
-    // opened for reading.
-    let stalled = directory.join("pose.toml.new");
-    let made = Command::new("mkfifo").arg(&stalled).status().unwrap();
-    assert!(made.success());
-    let _stall = Stall(stalled.clone());
+#[test]
+fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_stamps() {
+    let mut runtime = tokio::runtime::Builder::new_multi_thread();
+    // The one thread for the disk.
+    let runtime = runtime.worker_threads(2).max_blocking_threads(1);
+    let runtime = runtime.enable_all().build().unwrap();
+    runtime.block_on(poses_during_a_stall());
+}
+
+async fn poses_during_a_stall() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("pose.toml");
     let scene = Scene::new();
-    let wheels = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
     let sensor = PoseSensor {
         file: Some(file.clone()),
         ..PoseSensor::default()
     };
     let pose = scene.start(POSE, |slot| sensor.run(slot));
+    scene
+        .until("the sensor, which has looked for its file", || async {
+            let query = QueryLocalPose::none().with_x();
+            scene.client.query(POSE, &query).await.ok()
+        })
+        .await;
+    let (release, stall) = std::sync::mpsc::channel::<()>();
+    let disk = tokio::task::spawn_blocking(move || stall.recv());
+    // Its first count is what the sensor writes first.
+    let wheels = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
     let ask = async || {
         let query = QueryLocalPose::none().with_x().with_y().with_time_stamp();
         let report = scene.client.query(POSE, &query).await.ok();
@@ -318,18 +313,13 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
         })
         .await;
     assert!(!file.exists(), "the disk did stall");
-    // Read it, so that the writer can finish.
-    let reader = std::thread::spawn(move || {
-        let _ = std::fs::read(&stalled);
-        std::fs::remove_file(&stalled)
-    });
+    drop(release);
     scene
         .until("the file", || async { file.exists().then_some(()) })
         .await;
-    reader.join().unwrap().unwrap();
+    disk.await.unwrap().unwrap_err();
     pose.stop().await;
     wheels.stop().await;
-    std::fs::remove_dir_all(&directory).unwrap();
 }
 
 #[tokio::test(start_paused = true)]

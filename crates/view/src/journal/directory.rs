@@ -4,9 +4,11 @@
 //! determines the age. The time after it is informational.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io;
 use std::path::PathBuf;
+
+use jaus_files::{FileDraft, Readers, options};
 
 use super::{JournalFormat, JournalSettings};
 use crate::time::Timestamp;
@@ -46,9 +48,7 @@ impl Directory {
             }
         }
         directory.make_room()?;
-        let probe = directory.path.join(format!(".{NAME}probe"));
-        File::create(&probe)?;
-        fs::remove_file(probe)?;
+        FileDraft::new(&directory.path.join(NAME), Readers::Group)?;
         Ok(directory)
     }
 
@@ -64,10 +64,8 @@ impl Directory {
         let time = time.replace(['-', ':'], "");
         let name = format!("{NAME}{number:06}-{time}Z.{}", self.extension);
         let path = self.path.join(name);
-        let file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(&path)?;
+        // It has all that operators and vehicles send each other.
+        let file = options(Readers::Group).create_new(true).open(&path)?;
         self.files.insert(number, (path.clone(), 0));
         Ok((file, path))
     }

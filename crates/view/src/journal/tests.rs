@@ -94,6 +94,21 @@ async fn log_messages(settings: &JournalSettings, count: u32) -> JournalCounters
     }
 }
 
+#[cfg(unix)]
+#[tokio::test]
+async fn no_other_user_of_the_host_reads_the_log() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    for format in [JournalFormat::Packets, JournalFormat::JsonLines] {
+        let scratch = Scratch::new(&format!("mode-{format:?}"));
+        log_messages(&settings(&scratch, format), 1).await;
+        let files = scratch.files();
+        assert_eq!(files.len(), 1);
+        let mode = fs::metadata(&files[0]).unwrap().permissions().mode();
+        assert_eq!(mode & 0o137, 0, "{mode:o}");
+    }
+}
+
 #[tokio::test]
 async fn the_oldest_files_go_before_the_directory_holds_more_than_it_may() {
     let scratch = Scratch::new("bound");

@@ -1,18 +1,17 @@
 //! The files of a black box: bounded in number, and complete or not there.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use jaus_files::{FileDraft, FileLock, Readers};
 use jaus_view::Timestamp;
-
-use crate::recorder::recording_file_options;
 
 /// Prefix of all file names.
 const NAME: &str = "black-box-";
-/// The file that is being written.
-const PART: &str = ".black-box.part";
+/// Prefix and ending of the drafts of files.
+const DRAFT: (&str, &str) = (".black-box-", ".new");
 /// The file that is locked while a black box uses the directory.
 const LOCK: &str = ".black-box.lock";
 
@@ -22,13 +21,12 @@ const LOCK: &str = ".black-box.lock";
 /// is killed a moment later. One black box at a time uses a directory.
 #[derive(Debug)]
 pub struct BlackBoxFiles {
-    directory: PathBuf,
     most: usize,
     /// By number, with those of earlier runs.
     files: BTreeMap<u64, PathBuf>,
     deleted_on_full_disk: u64,
     /// Locked until it is closed.
-    _lock: File,
+    _lock: FileLock,
 }
 
 /// The names of the files that come next. Apart from the files, so that naming one never waits for
@@ -66,20 +64,21 @@ impl BlackBoxFiles {
             let name = path.file_name().and_then(|name| name.to_str());
             if let Some(number) = name.and_then(number_of) {
                 files.insert(number, path);
+            } else if name.is_some_and(|it| it.starts_with(DRAFT.0) && it.ends_with(DRAFT.1)) {
+                // Another black box was killed while it wrote.
+                fs::remove_file(path)?;
             }
         }
-        let part = directory.join(PART);
-        match create(&part).and_then(|_| fs::remove_file(&part)) {
+        match FileDraft::new(&directory.join(NAME), Readers::Group) {
             // Writing makes room.
             Err(error) if is_full(&error) => {}
-            checked => checked?,
+            checked => drop(checked?),
         }
         let names = BlackBoxNames {
             directory: directory.to_owned(),
             next: files.last_key_value().map_or(1, |(&last, _)| last + 1),
         };
         let files = Self {
-            directory: directory.to_owned(),
             most: most.max(1),
             files,
             deleted_on_full_disk: 0,
@@ -106,7 +105,7 @@ impl BlackBoxFiles {
         let number = number.ok_or(io::ErrorKind::InvalidInput)?;
         self.make_room(number)?;
         loop {
-            match self.write_whole(path, &mut write) {
+            match write_whole(path, &mut write) {
                 Err(error) if is_full(&error) && self.has_old_files() => {
                     self.delete_oldest(number)?;
                     self.deleted_on_full_disk += 1;
@@ -116,8 +115,6 @@ impl BlackBoxFiles {
             }
         }
         self.files.insert(number, path.to_owned());
-        // The name, too, survives a loss of power; not every file system can do that.
-        let _ = File::open(&self.directory).and_then(|it| it.sync_all());
         Ok(())
     }
 
@@ -125,24 +122,6 @@ impl BlackBoxFiles {
     #[must_use]
     pub const fn deleted_on_full_disk(&self) -> u64 {
         self.deleted_on_full_disk
-    }
-
-    fn write_whole(
-        &self,
-        path: &Path,
-        mut write: impl FnMut(&mut File) -> io::Result<()>,
-    ) -> io::Result<()> {
-        let part = self.directory.join(PART);
-        let written = create(&part).and_then(|mut file| {
-            write(&mut file)?;
-            file.sync_all()?;
-            fs::rename(&part, path)
-        });
-        if written.is_err() {
-            // The rest of it would only fill the disk.
-            let _ = fs::remove_file(&part);
-        }
-        written
     }
 
     /// Whether there are files besides the newest.
@@ -173,28 +152,21 @@ impl BlackBoxFiles {
     }
 }
 
-fn create(part: &Path) -> io::Result<File> {
-    recording_file_options()
-        .create(true)
-        .truncate(true)
-        .open(part)
+fn write_whole(path: &Path, write: &mut impl FnMut(&mut File) -> io::Result<()>) -> io::Result<()> {
+    let mut draft = FileDraft::new(path, Readers::Group)?;
+    write(draft.file())?;
+    draft.replace()
 }
 
 /// Locks the directory, unless its file system has no locks.
-fn lock(directory: &Path) -> io::Result<File> {
-    let mut options = OpenOptions::new();
-    // The octets of another process's lock file are of no interest.
-    let options = options.write(true).create(true).truncate(false);
-    let file = options.open(directory.join(LOCK))?;
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(io::Error::new(
+fn lock(directory: &Path) -> io::Result<FileLock> {
+    FileLock::try_at(&directory.join(LOCK), Readers::Owner)?.ok_or_else(|| {
+        io::Error::new(
             io::ErrorKind::ResourceBusy,
             "another black box uses this directory: name another directory, or end the other \
              program",
-        )),
-        Err(TryLockError::Error(error)) if error.kind() != io::ErrorKind::Unsupported => Err(error),
-        _ => Ok(file),
-    }
+        )
+    })
 }
 
 /// Whether deleting files helps.
@@ -279,6 +251,18 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"whole");
         assert_eq!(names_in(directory.path()).len(), 1);
     }
+
+    #[test]
+    fn what_a_killed_black_box_has_left_is_removed() {
+        let directory = tempfile::tempdir().unwrap();
+        let (_, mut names) = BlackBoxFiles::open(directory.path(), 2).unwrap();
+        let path = names.reserve(Timestamp::new(0, 0, 9), "fault", "mcap");
+        std::mem::forget(FileDraft::new(&path, Readers::Group).unwrap());
+        assert_eq!(names_in(directory.path()).len(), 1);
+        BlackBoxFiles::open(directory.path(), 2).unwrap();
+        assert_eq!(names_in(directory.path()).len(), 0);
+    }
+
     #[test]
     fn a_full_disk_costs_the_oldest_files_and_never_the_newest() {
         let directory = tempfile::tempdir().unwrap();
