@@ -13,6 +13,7 @@ use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, Ip, interface};
 use jaus::node::{Config, Tcp, units};
 use jaus_audit::{AuditLog, Limits};
+use jaus_secure::rules::Rules;
 use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
@@ -375,8 +376,9 @@ fn outside(tcp: &Tcp, interfaces: &[Interface]) -> Option<SocketAddr> {
     listen.or_else(|| peers.find(|peer| !is_reached(peer)))
 }
 
-/// Writes a trust file with these peers if there is none. An existing file must trust them: it is
-/// not changed, or a restart with the same flags would undo a revocation.
+/// Writes a trust file with these peers if there is none. An existing file must trust them for the same ids
+/// and with the same rules: it is not changed, or a restart with the same flags would undo a revocation; and
+/// narrower rules must not be ignored.
 fn trust_at_first_start(file: &Path, peers: &[Peer]) -> Result<(), Failure> {
     if !file.exists() {
         let mut each = peers.iter();
@@ -386,19 +388,38 @@ fn trust_at_first_start(file: &Path, peers: &[Peer]) -> Result<(), Failure> {
         return Ok(());
     }
     let trust = TrustFile::load(file).map_err(Failure::of)?;
-    let is_missing = |peer: &&Peer| trust.find(peer.key).is_none_or(|it| it.ids != peer.ids);
-    let Some(peer) = peers.iter().find(is_missing) else {
-        return Ok(());
+    peers
+        .iter()
+        .try_for_each(|peer| match trust.find(peer.key) {
+            Some(known) if known.ids == peer.ids && known.rules == peer.rules => Ok(()),
+            Some(known) if known.ids == peer.ids => Err(other_rules(file, &known, peer)),
+            _ => Err(untrusted(file, peer)),
+        })
+}
+
+fn other_rules(file: &Path, known: &Peer, peer: &Peer) -> Failure {
+    let file = file.display();
+    let words = |rules: &Rules| match rules.to_string() {
+        none if none.is_empty() => "observe".to_owned(),
+        words => words,
     };
-    let (name, key) = (&peer.name, peer.key);
+    let (name, has, wants) = (&known.name, words(&known.rules), words(&peer.rules));
+    Failure::new(format!(
+        "{file} says `{has}` of the key of `{name}`, but --trust says `{wants}`: run `jaus keys allow {name} \
+         {wants}`, or correct --trust"
+    ))
+}
+
+fn untrusted(file: &Path, peer: &Peer) -> Failure {
+    let (file, name, key, rules) = (file.display(), &peer.name, &peer.key, &peer.rules);
     let ids: Vec<_> = peer.ids.iter().map(JausId::to_string).collect();
-    Err(Failure::new(format!(
-        "{} does not trust the key of `{name}` for {}, which --trust names: was it revoked? Omit \
-         --trust, or run `jaus keys trust {name} {key} {}`",
-        file.display(),
-        ids.join(","),
-        ids.join(","),
-    )))
+    let ids = ids.join(",");
+    let remedy = format!("jaus keys trust {name} {key} {ids} {rules}");
+    let remedy = remedy.trim_end();
+    Failure::new(format!(
+        "{file} does not trust the key of `{name}` for {ids}, which --trust names: was it revoked? Omit \
+         --trust, or run `{remedy}`"
+    ))
 }
 
 /// A key that is missing is made by a command.
@@ -446,6 +467,29 @@ mod tests {
         let remedy = format!("jaus keys trust operator {key} 60.255.255");
         assert!(refused.contains(&remedy), "{refused}");
         assert_eq!(TrustFile::load(&file).unwrap().find(operator.key), None);
+    }
+
+    #[test]
+    fn a_restart_with_other_rules_for_a_key_is_refused_and_names_the_command() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("trusted_keys");
+        let peer = |rules: &str| -> [Peer; 1] {
+            let key = format!("{}=", "A".repeat(43));
+            let peer = format!("operator {key} 60.255.255 {rules}");
+            [peer.parse().unwrap()]
+        };
+        trust_at_first_start(&file, &peer("control=127")).unwrap();
+        trust_at_first_start(&file, &peer("control=127")).unwrap();
+        let narrower = peer("observe");
+        let refused = trust_at_first_start(&file, &narrower);
+        let refused = refused.unwrap_err().to_string();
+        assert!(
+            refused.contains("jaus keys allow operator observe"),
+            "{refused}"
+        );
+        assert!(refused.contains("control=127"), "{refused}");
+        assert!(edit::allow(&file, "operator", &narrower[0].rules).unwrap());
+        trust_at_first_start(&file, &narrower).unwrap();
     }
 
     #[test]

@@ -97,7 +97,7 @@ fn the_operators_token_is_never_logged_and_printed_only_if_it_was_generated() {
     const TOKEN: &str = "0123456789abcdef-of-the-file";
     let directory = scratch("token");
     let file = directory.join("token");
-    std::fs::write(&file, TOKEN).unwrap();
+    jaus_files::replace(&file, jaus_files::Readers::Owner, TOKEN.as_bytes()).unwrap();
     let group = group_flag(own_group());
     let station = env!("CARGO_BIN_EXE_jaus-ocu");
     let flags = ["--group", &group, "--listen"];

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use jaus_cli::failure::Failure;
 use jaus_cli::output::counted;
-use jaus_viewers::{Recording, recording_file_options};
+use jaus_files::Readers;
+use jaus_viewers::Recording;
 
 /// Opens a recording: pcap, pcapng or MCAP.
 pub(crate) fn open(path: &Path) -> Result<Recording<BufReader<File>>, Failure> {
@@ -15,9 +16,10 @@ pub(crate) fn open(path: &Path) -> Result<Recording<BufReader<File>>, Failure> {
         .map_err(|error| Failure::new(format!("{}: {error}", path.display())))
 }
 
-/// Creates a file, which must not exist without `overwrite`.
+/// Creates a file for its owner and group, because it has all that operators and vehicles send each other. It
+/// must not exist without `overwrite`.
 pub(crate) fn create(path: &Path, overwrite: bool) -> Result<File, Failure> {
-    let mut options = recording_file_options();
+    let mut options = jaus_files::options(Readers::Group);
     options.truncate(true);
     let options = if overwrite {
         options.create(true)

@@ -17,7 +17,7 @@ const TOKEN: &str = "a-token-of-the-tests";
 /// Where pages may watch without the token, they may also stop the vehicle, and clear no emergency.
 pub(crate) fn run() {
     let file = std::env::temp_dir().join(format!("jaus-e2e-token-{}", std::process::id()));
-    std::fs::write(&file, TOKEN).unwrap();
+    jaus_files::replace(&file, jaus_files::Readers::Owner, TOKEN.as_bytes()).unwrap();
     let (_vehicle, _) = Running::start(TEST, "jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
     let station = [
         "--listen",

@@ -227,6 +227,44 @@ fn a_revoked_key_loses_its_link_and_gets_no_other() {
 }
 
 #[test]
+fn while_the_trust_file_is_broken_links_remain_and_no_other_key_gets_one() {
+    let (_vehicle, at_vehicle, operator, address) = vehicle_and_operator("115.1.9");
+    let tablet = stranger(&at_vehicle);
+    let key = tablet.keys(&["show"]).stdout;
+    at_vehicle.trust("tablet", key.trim(), "61.255.255");
+    let flags = operator.flags();
+    let flags = flags.each_ref().map(String::as_str);
+    let watch = ["--watch", "--id", "60.1.1", "--secure-peer", &address];
+    let mut watching = Running::command("discover", &[&watch[..], &flags].concat());
+    watching.read_until("115.1.9");
+    let query = [
+        "query",
+        "115.1.9",
+        "QueryIdentification",
+        WHICH,
+        "--timeout",
+        "2s",
+        "--id",
+        "61.1.1",
+    ];
+    let status = || as_operator(&tablet, &address, &query).status;
+    assert_eq!(status(), 0);
+
+    let path = at_vehicle.file("trusted_keys");
+    let good = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, format!("{good}half a line\n")).unwrap();
+    // The vehicle reads the file within a second.
+    block_until(|| status() == 1);
+    let audit = || std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    block_until(|| audit().contains("new sessions are refused here until a file can be used"));
+    let ended = r#""who":"operator","what":"disconnect""#;
+    assert!(!audit().contains(ended), "the operator's link remains");
+    std::fs::write(&path, good).unwrap();
+    block_until(|| status() == 0);
+    assert!(!audit().contains(ended), "the operator's link remains");
+}
+
+#[test]
 fn keys_are_made_shown_listed_and_revoked_with_clear_errors() {
     let host = Host::new();
     let missing = host.keys(&["show"]);

@@ -144,7 +144,7 @@ async fn neither_a_private_key_nor_the_token_is_in_any_output_at_trace_level() {
     );
 
     let token = operator.file("token");
-    std::fs::write(&token, TOKEN).unwrap();
+    jaus_files::create(token.as_ref(), jaus_files::Readers::Owner, TOKEN.as_bytes()).unwrap();
     let port = free_port();
     let page = format!("127.0.0.1:{port}");
     let trust = format!("rover {} 116.255.255", vehicle.public_key());

@@ -1,11 +1,11 @@
 //! The subsystems of a demo, and a network of its own: the multicast group and ports that keep it apart from other demos on
 //! the same host, whose components have the same ids.
 
-use std::fs::File;
 use std::net::SocketAddrV4;
 
 use jaus::link::{Group, STANDARD_GROUP};
 use jaus_cli::failure::Failure;
+use jaus_files::{FileLock, Readers};
 use jaus_view::debug::DebugAddress;
 
 /// The operator's subsystem.
@@ -19,7 +19,7 @@ const MOST: u16 = 16;
 pub(super) struct OwnNetwork {
     number: u16,
     /// Locked until the process ends, however it ends; none where no file can be written.
-    _lock: Option<File>,
+    _lock: Option<FileLock>,
 }
 
 impl OwnNetwork {
@@ -27,18 +27,12 @@ impl OwnNetwork {
     pub(super) fn take() -> Result<Self, Failure> {
         let free = (0..MOST).find_map(|number| {
             let path = std::env::temp_dir().join(format!("jaus-demo-{number}.lock"));
-            // Another user's file can be locked, but not created.
-            let Ok(lock) = File::open(&path).or_else(|_| File::create(&path)) else {
-                return Some(Self {
-                    number,
-                    _lock: None,
-                });
+            // The demos of all users share the network.
+            let _lock = match FileLock::try_at(&path, Readers::Everyone) {
+                Ok(lock) => Some(lock?),
+                Err(_) => None,
             };
-            let is_free = lock.try_lock().is_ok();
-            is_free.then_some(Self {
-                number,
-                _lock: Some(lock),
-            })
+            Some(Self { number, _lock })
         });
         free.ok_or_else(|| Failure::new(format!("{MOST} demos run on this computer: end one")))
     }

@@ -1,13 +1,13 @@
 //! `jaus jsidl fmt`: formats definitions.
 
-use std::fs::{self, File};
-use std::io::Write;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::{Output, counted, say};
+use jaus_files::Readers;
 use jsidl::{Diagnostics, format};
 
 use super::definitions::{STANDARD_INPUT, complain, standard_input};
@@ -143,23 +143,7 @@ impl Run {
     }
 }
 
-/// Replaces a file atomically: a reader sees the old or the new text.
+/// Replaces a file; of a link, the file that it leads to.
 fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    // Replace the target of a link.
-    let path = fs::canonicalize(path)?;
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(std::format!(".{}.tmp", std::process::id()));
-    let beside = path.with_file_name(name);
-    let written = write(&beside, text, &path).and_then(|()| fs::rename(&beside, &path));
-    if written.is_err() {
-        let _ = fs::remove_file(&beside);
-    }
-    written
-}
-
-fn write(beside: &Path, text: &str, path: &Path) -> std::io::Result<()> {
-    let mut file = File::create_new(beside)?;
-    file.set_permissions(fs::metadata(path)?.permissions())?;
-    file.write_all(text.as_bytes())?;
-    file.sync_all()
+    jaus_files::replace(&fs::canonicalize(path)?, Readers::Everyone, text.as_bytes())
 }

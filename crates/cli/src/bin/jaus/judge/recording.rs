@@ -19,6 +19,8 @@ use jaus::wire::{Flags, Frame, judp};
 use jaus_cli::failure::Failure;
 use jaus_view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 
+use crate::recordings;
+
 /// Assumed TTL of recorded packets.
 const TTL: u8 = 16;
 /// Stands for an unknown address.
@@ -36,7 +38,7 @@ impl Recording {
     /// Creates the file, replacing an existing one.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let failed = |error: io::Error| Failure::file(path, &error);
-        let file = File::create(path).map_err(failed)?;
+        let file = recordings::create(path, true)?;
         let program = concat!("jaus ", env!("CARGO_PKG_VERSION"), " judge");
         let mut writer = CaptureWriter::new(BufWriter::new(file), program).map_err(failed)?;
         let interface = writer

@@ -1,8 +1,8 @@
 //! System status for other programs: a JSON file that is replaced atomically at every change.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use jaus_files::{Readers, replace};
 use serde_json::{Value as Json, json};
 
 use super::supervisor::{Exit, State};
@@ -31,7 +31,8 @@ impl StatusFile {
         if status == self.written {
             return None;
         }
-        match replace(&self.path, &format!("{status:#}\n")) {
+        let text = format!("{status:#}\n");
+        match replace(&self.path, Readers::Everyone, text.as_bytes()) {
             Ok(()) => {
                 self.written = status;
                 self.failed = false;
@@ -41,14 +42,6 @@ impl StatusFile {
             Err(error) => Some(format!("--status {}: {error}", self.path.display())),
         }
     }
-}
-
-/// Replaces a file atomically: readers see the old or the new one.
-fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    let mut new = path.as_os_str().to_owned();
-    new.push(".new");
-    fs::write(&new, text)?;
-    fs::rename(&new, path)
 }
 
 /// Status of one part.
