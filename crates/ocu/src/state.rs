@@ -1,6 +1,6 @@
 //! Snapshots for pages: the vehicle of the page, the list of vehicles, and the tree of components. Each
 //! one is complete, so that a reconnecting page needs nothing else; of the first kind a page then gets the
-//! [changes](super::changes). Unknown values are `null`.
+//! changes. Unknown values are `null`.
 
 use std::time::Instant;
 

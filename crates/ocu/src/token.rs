@@ -69,8 +69,8 @@ impl Token {
     /// Reads the token from a file of one line.
     ///
     /// # Errors
-    /// If the file cannot be read, other users of this host can read it, or its content is too short, too long, or contains characters
-    /// other than letters, digits and `-._~`.
+    /// If the file cannot be read, other users of this host can read it, or its content is too short, too long,
+    /// or contains characters other than letters, digits and `-._~`.
     pub fn read(file: &Path) -> Result<Self, TokenError> {
         let name = || file.display().to_string();
         let text = jaus_files::read_text(file, Readers::Owner, Self::LONGEST_FILE);

@@ -21,30 +21,23 @@ const NO_PARTS: &str =
 impl Session {
     /// Sends an emergency at once.
     pub(super) fn handle_stop(&mut self, now: Instant, order: StopOrder) {
-        let StopOrder {
-            target,
-            press,
-            user,
-            reply,
-        } = order;
-        let (all, number) = match target {
-            StopTarget::OfPage(page) => (false, self.pages.vehicle(page)),
-            StopTarget::Vehicle(number) => (false, Some(number)),
-            StopTarget::All => (true, None),
+        let (press, reply) = (order.press, order.reply);
+        let target = match order.target {
+            StopTarget::All => None,
+            StopTarget::Vehicle(number) => Some(number),
+            StopTarget::OfPage(page) => match self.pages.vehicle(page) {
+                None => return reply.refused(NO_VEHICLE),
+                shown => shown,
+            },
         };
-        if !all && number.is_none() {
-            return reply.refused(NO_VEHICLE);
-        }
-        let Some(count) = self.presses.take(press, number) else {
+        let Some(count) = self.presses.take(press, target) else {
             return reply.ignored();
         };
-        if all {
-            self.stop_all(now, (press, count), reply);
-            return self.note_emergency_of_all(now, &user, true);
-        }
-        self.note_emergency(now, number, &user, true);
-        let vehicle = number.and_then(|number| self.fleet.get_mut(number));
-        let Some(vehicle) = vehicle else {
+        self.note_emergency(now, target, &order.user, true);
+        let Some(number) = target else {
+            return self.stop_all(now, (press, count), reply);
+        };
+        let Some(vehicle) = self.fleet.get_mut(number) else {
             return reply.refused(NO_VEHICLE);
         };
         let is_new = vehicle.set_emergency(now, &mut self.client);
@@ -82,8 +75,7 @@ impl Session {
         }
     }
 
-    /// Handles a request to clear emergencies of a vehicle or of all, by an operator who knows of the stops
-    /// `known`.
+    /// Clears emergencies of a vehicle or of all, for an operator who knows of the stops `known`.
     pub(super) fn clear(
         &mut self,
         now: Instant,
@@ -94,20 +86,22 @@ impl Session {
     ) {
         let is_of_all = matches!(request, OperatorRequest::EmergencyAll { .. });
         let target = vehicle.filter(|_| !is_of_all);
-        if let Some(known) = known.filter(|_| is_of_all || target.is_some())
+        if !is_of_all && target.is_none() {
+            return reply(Err(NO_VEHICLE.to_owned()));
+        }
+        if let Some(known) = known
             && let Err(pressed) = self.presses.clear(known, target)
         {
             return reply(Err(pressed.to_string()));
         }
+        self.note_emergency(now, target, user, false);
         if is_of_all {
-            self.note_emergency_of_all(now, user, false);
             return self.clear_all_emergencies(now, reply);
         }
         let whose = match request {
             OperatorRequest::ClearAnyEmergency => Cleared::Any,
             _ => Cleared::Own,
         };
-        self.note_emergency(now, vehicle, user, false);
         self.clear_emergency(now, vehicle, whose, reply);
     }
 

@@ -156,7 +156,7 @@ impl Fleet {
     }
 
     /// The list of vehicles, with whether all are to be stopped, and the number of stops taken.
-    pub(super) fn state(&self, now: Instant, (all_stopped, stops): (bool, u64)) -> state::Fleet {
+    pub(super) fn state(&self, now: Instant, all_stopped: bool, stops: u64) -> state::Fleet {
         let vehicles = self.vehicles.values();
         state::Fleet {
             vehicles: vehicles.map(|it| it.fleet_state(now)).collect(),

@@ -251,8 +251,8 @@ impl Session {
     }
 
     fn publish_fleet(&mut self, now: Instant) {
-        let stops = (self.all_stopped, self.presses.count());
-        let fleet = self.fleet.state(now, stops);
+        let stops = self.presses.count();
+        let fleet = self.fleet.state(now, self.all_stopped, stops);
         self.publisher.fleet(&Said::Fleet(&fleet));
         let tree = self.fleet.tree(now);
         if self.published.as_ref() != Some(&tree) {

@@ -26,23 +26,17 @@ impl Session {
         self.events.retain(|number| fleet.contains(number));
     }
 
-    /// Logs a request for the emergency of a vehicle, or for its end.
+    /// Logs a request for the emergency of a vehicle or of all, or for its end.
     pub(super) fn note_emergency(
         &mut self,
         now: Instant,
-        vehicle: Option<u16>,
+        target: Option<u16>,
         user: &Arc<str>,
         on: bool,
     ) {
-        if let Some(vehicle) = vehicle.filter(|number| self.fleet.contains(*number)) {
-            let now = event_time(now);
-            self.events.handle_request(now, &[vehicle], user, on);
-        }
-    }
-
-    /// Logs a request for the emergency of all vehicles, or for its end.
-    pub(super) fn note_emergency_of_all(&mut self, now: Instant, user: &Arc<str>, on: bool) {
-        let vehicles: Vec<u16> = self.fleet.numbers().collect();
+        let vehicles = self.fleet.numbers();
+        let vehicles = vehicles.filter(|it| target.is_none_or(|target| target == *it));
+        let vehicles: Vec<u16> = vehicles.collect();
         let now = event_time(now);
         self.events.handle_request(now, &vehicles, user, on);
     }

@@ -27,8 +27,8 @@ pub fn append(path: &Path, readers: Readers) -> io::Result<File> {
     open_or_create(path, readers, OpenOptions::new().append(true)).map(|(file, _)| file)
 }
 
-/// Opens a regular file, or creates it; returns whether it did. Two steps, so that a file of another user in a sticky folder is
-/// opened too, which Linux refuses to an open that may create (`fs.protected_regular`).
+/// Opens a regular file, or creates it; returns whether it did. Two steps, so that a file of another user in a
+/// sticky folder is opened too, which Linux refuses to an open that may create (`fs.protected_regular`).
 pub(crate) fn open_or_create(
     path: &Path,
     readers: Readers,
