@@ -88,6 +88,9 @@ export class Engage {
     } else if (mode === "standby" && !this.#resumed) {
       this.#resumed = true;
       this.#request({ type: "resume" });
+    } else if (this.#isLate) {
+      // Somebody has stopped it meanwhile, for example.
+      this.#end("The vehicle did not get ready: press again");
     }
   }
 

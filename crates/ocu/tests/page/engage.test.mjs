@@ -58,6 +58,26 @@ test("a vehicle that is ready as another client has left it is resumed for this 
   assert.ok(!get("by-hand").hidden, "it says what to press");
 });
 
+test("a vehicle that is resumed and does not get ready can be tried again", async () => {
+  const { engage, asked, isReady } = pressed();
+  await null;
+  engage.update(held("standby"), true, "");
+  await null;
+  now += 2_000;
+  engage.update(held("standby"), true, "");
+  assert.ok(get("by-hand").disabled, "it may take a while");
+  now += 1;
+  engage.update(held("standby"), true, "");
+  assert.ok(!get("by-hand").disabled);
+  get("by-hand").click();
+  await null;
+  engage.update(held("standby"), true, "");
+  await null;
+  engage.update(held("ready"), true, "");
+  assert.deepEqual(asked, ["control", "resume", "control", "resume"]);
+  assert.ok(isReady());
+});
+
 test("a connection that stays lost ends it: the vehicle does not become ready when it comes back", async () => {
   const { engage, asked, isReady } = pressed();
   await null;
