@@ -508,6 +508,7 @@ mod tests {
         assert!(file.find(key(1)).is_none());
         assert_eq!(file.fault(), None);
     }
+
     #[cfg(unix)]
     #[test]
     fn a_file_that_others_can_change_is_refused_with_the_remedy() {

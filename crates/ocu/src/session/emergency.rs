@@ -56,7 +56,7 @@ impl Session {
         let mut stopped = Vec::new();
         for vehicle in self.fleet.iter_mut() {
             let number = Some(vehicle.number());
-            // A copy, which arrives after somebody has cleared this one.
+            // The press was cleared for this vehicle, and this is a late copy of it.
             if press.is_some_and(|press| self.presses.is_cleared(press, number)) {
                 continue;
             }

@@ -45,10 +45,10 @@ impl FileDraft {
     /// # Errors
     /// If the draft cannot be created; [`io::ErrorKind::InvalidInput`] if `target` is a symbolic link or no
     /// regular file; [`io::ErrorKind::PermissionDenied`] if the draft cannot have the owner of the file:
-    /// then whoever reads the file now could not read the new one.
+    /// then those who read the file now would lose access to it.
     pub fn new(target: &Path, readers: Readers) -> io::Result<Self> {
         let former = regular(target)?;
-        // Until the draft has the mode of the file, nobody else opens it.
+        // It stays private until it gets the mode of the file.
         let readers = if former.is_some() {
             Readers::Owner
         } else {

@@ -1,4 +1,4 @@
-//! Who may read a file, and the check that nobody else can read or change it.
+//! Who may read a file, and the check of its mode and folder.
 
 use std::fs::File;
 use std::io::{self, Read as _};
