@@ -1,7 +1,7 @@
 //! Rules for a vehicle under Management, derived only from its messages: which client's commands it
 //! follows, its state, and its controller.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
@@ -20,7 +20,8 @@ pub(crate) struct Rules {
     told: Option<JausId>,
     /// When that client last requested control.
     asked: Instant,
-    emergencies: BTreeSet<JausId>,
+    /// The clients with an emergency, with the number of the newest message that set it.
+    emergencies: BTreeMap<JausId, Numbered>,
     /// When each client last sent a message: the client in control may clear the emergency of a
     /// client that is silent for long.
     heard: BTreeMap<JausId, Instant>,
@@ -34,6 +35,35 @@ pub(crate) struct Rules {
     released: Option<JausId>,
     /// Clients whose commands it should execute now.
     acts_for: Vec<JausId>,
+}
+
+/// A message's arrival, and the number that its client gave it.
+#[derive(Clone, Copy)]
+struct Numbered {
+    number: Option<u16>,
+    at: Instant,
+}
+
+impl Numbered {
+    /// What is set or cleared more than 4 s or 4096 numbers apart is in the order of arrival.
+    const MEMORY: Duration = Duration::from_secs(4);
+    const REACH: u16 = 4096;
+
+    fn of(at: Instant, message: &Received) -> Self {
+        let is_counted = message.destination.is_unicast();
+        let number = message.sequence.filter(|_| is_counted);
+        Self { number, at }
+    }
+
+    /// Whether the client sent this before the other, which has arrived already.
+    fn is_before(self, other: Self) -> bool {
+        let lag = self
+            .number
+            .zip(other.number)
+            .map(|(a, b)| b.wrapping_sub(a));
+        lag.is_some_and(|lag| (1..=Self::REACH).contains(&lag))
+            && self.at.saturating_duration_since(other.at) < Self::MEMORY
+    }
 }
 
 /// No message is on its way for longer.
@@ -53,7 +83,7 @@ impl Rules {
             timeout,
             told: None,
             asked: now,
-            emergencies: BTreeSet::new(),
+            emergencies: BTreeMap::new(),
             heard: BTreeMap::new(),
             resumed: false,
             restarted: BTreeMap::new(),
@@ -74,14 +104,21 @@ impl Rules {
         let commands = self.told == Some(client) && self.emergencies.is_empty();
         match code_of(&message.payload) {
             Some(SetEmergency::CODE) => {
-                self.emergencies.insert(client);
+                let set = Numbered::of(now, message);
+                let newest = self.emergencies.entry(client).or_insert(set);
+                if !set.is_before(*newest) {
+                    *newest = set;
+                }
                 self.resumed = false;
             }
+            // It arrives late: its client has set the emergency again since, or has restarted and
+            // counts anew.
+            Some(ClearEmergency::CODE) if self.has_since(Numbered::of(now, message), client) => {}
             Some(ClearEmergency::CODE) => {
-                let mut is_cleared = self.emergencies.remove(&client);
+                let mut is_cleared = self.emergencies.remove(&client).is_some();
                 if self.told == Some(client) {
                     let (heard, before) = (&self.heard, self.emergencies.len());
-                    self.emergencies.retain(|id| !is_silent(heard, now, *id));
+                    self.emergencies.retain(|id, _| !is_silent(heard, now, *id));
                     is_cleared |= self.emergencies.len() < before;
                 }
                 if is_cleared {
@@ -97,6 +134,12 @@ impl Rules {
         }
     }
 
+    /// Whether the client has set an emergency after it sent this.
+    fn has_since(&self, sent: Numbered, client: JausId) -> bool {
+        let newest = self.emergencies.get(&client);
+        newest.is_some_and(|&newest| sent.is_before(newest))
+    }
+
     /// Processes a message from the vehicle.
     pub(crate) fn say(&mut self, now: Instant, message: &Outgoing) -> Result<(), String> {
         let client = message.destination;
@@ -107,7 +150,7 @@ impl Rules {
             let heard = &self.heard;
             if self
                 .emergencies
-                .iter()
+                .keys()
                 .any(|&id| !is_silent(heard, now, id))
             {
                 return Err(format!("{client} is granted control in an emergency"));
@@ -159,7 +202,7 @@ impl Rules {
         self.released = None;
         self.resumed &= controller.is_some();
         if (standing.state == State::Emergency) == self.emergencies.is_empty() {
-            let clients = &self.emergencies;
+            let clients = self.emergencies.keys();
             return Err(format!(
                 "{} with emergencies of {clients:?}",
                 standing.state
