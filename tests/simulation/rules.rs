@@ -22,6 +22,9 @@ pub(crate) struct Rules {
     asked: Instant,
     /// The clients with an emergency, with the number of the newest message that set it.
     emergencies: BTreeMap<JausId, Numbered>,
+    /// Emergencies of others that a client has cleared that has restarted since it got control. The
+    /// vehicle may take it for one that is not in control.
+    perhaps_cleared: BTreeMap<JausId, Numbered>,
     /// When each client last sent a message: the client in control may clear the emergency of a
     /// client that is silent for long.
     heard: BTreeMap<JausId, Instant>,
@@ -84,6 +87,7 @@ impl Rules {
             told: None,
             asked: now,
             emergencies: BTreeMap::new(),
+            perhaps_cleared: BTreeMap::new(),
             heard: BTreeMap::new(),
             resumed: false,
             restarted: BTreeMap::new(),
@@ -117,9 +121,15 @@ impl Rules {
             Some(ClearEmergency::CODE) => {
                 let mut is_cleared = self.emergencies.remove(&client).is_some();
                 if self.told == Some(client) {
-                    let (heard, before) = (&self.heard, self.emergencies.len());
-                    self.emergencies.retain(|id, _| !is_silent(heard, now, *id));
-                    is_cleared |= self.emergencies.len() < before;
+                    let (silent, alive): (BTreeMap<_, _>, _) =
+                        std::mem::take(&mut self.emergencies)
+                            .into_iter()
+                            .partition(|(id, _)| is_silent(&self.heard, now, *id));
+                    self.emergencies = alive;
+                    is_cleared |= !silent.is_empty();
+                    if self.restarted.contains_key(&client) {
+                        self.perhaps_cleared = silent;
+                    }
                 }
                 if is_cleared {
                     // The client keeps control, and the timeout restarts.
@@ -201,6 +211,10 @@ impl Rules {
         }
         self.released = None;
         self.resumed &= controller.is_some();
+        let perhaps_cleared = std::mem::take(&mut self.perhaps_cleared);
+        if standing.state == State::Emergency {
+            self.emergencies.extend(perhaps_cleared);
+        }
         if (standing.state == State::Emergency) == self.emergencies.is_empty() {
             let clients = self.emergencies.keys();
             return Err(format!(

@@ -1,5 +1,6 @@
 //! Judges every step of a trial: what moves has a living hand behind it.
 
+use std::cmp;
 use std::time::Duration;
 
 use crate::air::Weather;
@@ -58,6 +59,8 @@ struct Hold {
     begun: Duration,
     /// When all was well for the last time: the hand, and every part of the way to the motor.
     alive: Duration,
+    /// When every part of the way was well for the last time, whatever the hand did.
+    connected: Duration,
     over: bool,
     /// The last sign of a hand that is over.
     last: Duration,
@@ -139,6 +142,7 @@ impl Witness {
             way,
             begun: now,
             alive: now,
+            connected: now,
             over: false,
             last: now,
             failed: 0,
@@ -264,6 +268,7 @@ impl Witness {
     }
 
     fn note_lives(&mut self, now: Duration, lives: &Lives) {
+        const HAND: u8 = 1;
         for hold in &mut self.holds {
             let dead = [
                 hold.over,
@@ -274,6 +279,9 @@ impl Witness {
             ];
             let dead = (0..).zip(dead).filter(|(_, is_dead)| *is_dead);
             let dead = dead.fold(0, |dead, (part, _)| dead | 1 << part);
+            if dead & !HAND == 0 {
+                hold.connected = now;
+            }
             if dead == 0 {
                 (hold.alive, hold.failed) = (now, 0);
             } else {
@@ -310,7 +318,7 @@ impl Witness {
             let goes_on = self.driven[vehicle] == driven || hold.is_lost;
             // What begins was sent while the hand held, perhaps as soon as the rest of the way was there again.
             let (since, limit) = match goes_on || !is_smooth(lives) {
-                true => (hold.alive, self.limit_of(hold)),
+                true => self.limit_of(hold),
                 false => (hold.last.max(hold.alive), self.limit(WAITING)),
             };
             let (silence, limit) = (now.saturating_sub(since), limit + delay);
@@ -358,7 +366,8 @@ impl Witness {
         way + lives.weather.detour
     }
 
-    fn limit_of(&self, hold: &Hold) -> Duration {
+    /// How long motion may last, and since when.
+    fn limit_of(&self, hold: &Hold) -> (Duration, Duration) {
         let is_single = hold.failed.count_ones() <= 1;
         let limit = if is_single { DEAD_MAN } else { DEAD_MAN_TWICE };
         let first = if hold.is_first {
@@ -366,7 +375,13 @@ impl Witness {
         } else {
             Duration::ZERO
         };
-        self.limit(limit + first)
+        let usual = (hold.alive, self.limit(limit + first));
+        // A way that is well again after the hand was lost carries what the page still takes for a hand.
+        let is_taken_up = hold.over && hold.connected >= hold.last;
+        let taken_up = is_taken_up.then(|| (hold.last, self.limit(DEAD_MAN + first)));
+        taken_up.map_or(usual, |it| {
+            cmp::max_by_key(usual, it, |(since, limit)| *since + *limit)
+        })
     }
 
     /// Judges emergency stops once the way to the vehicle is free: pages repeat them until then.
