@@ -105,7 +105,7 @@ impl<'a> Context<'a> {
     /// setpoints that its sender has sent before are no longer
     /// [admitted](Self::admits_setpoint). The stops of the core services are noted already.
     pub fn note_stop(&mut self, now: Instant, message: &Received) {
-        self.order.note_stop(now, message);
+        self.order.note_turn(now, message);
     }
 
     /// Reports a fault. A component with Management goes to

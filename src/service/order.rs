@@ -4,9 +4,11 @@
 //! retransmits what was lost, for seconds. So a setpoint may arrive after newer ones, or after the
 //! stop that its client has sent since. It must not move anything any more: a service does not
 //! [admit](super::Context::admits_setpoint) a setpoint that is older than the client's newest one of
-//! the same [series](series_of), or than its last stop (release, standby, reset, shutdown,
-//! emergency). A command of an application's own service is compared with the stops alone, because
-//! it may concern something else than the one before.
+//! the same [series](series_of), or than the client's last turn: a stop (release, standby, reset,
+//! shutdown, emergency), or what gave it control, or made the component ready for it. The latter
+//! matters where the component has restarted, and knows nothing of what was before. A command of an
+//! application's own service is compared with the turns alone, because it may concern something else
+//! than the one before.
 //!
 //! Stops are never checked: an old stop stops as well as a new one. What ends an emergency is: it may arrive
 //! after its client has set the next one, and must not end that. Neither are messages from
@@ -93,8 +95,8 @@ pub(super) struct SendOrder {
 
 #[derive(Debug, Default)]
 struct Client {
-    /// Its last stop.
-    stop: Option<Mark>,
+    /// Its last stop or start.
+    turn: Option<Mark>,
     /// Its newest setpoints, by series.
     setpoints: BTreeMap<(u16, u8), Mark>,
     /// Its last setpoint, if that was refused because its number is out of reach.
@@ -134,14 +136,14 @@ impl Mark {
 
 impl Client {
     fn is_recent(&self, now: Instant) -> bool {
-        let marks = self.setpoints.values().chain(&self.stop);
+        let marks = self.setpoints.values().chain(&self.turn);
         marks.chain(&self.stray).any(|mark| mark.is_recent(now))
     }
 
     /// How far a setpoint is behind those that supersede it.
     fn lead(&self, now: Instant, series: Option<(u16, u8)>, number: u16) -> u16 {
         let setpoint = series.and_then(|series| self.setpoints.get(&series));
-        let marks = setpoint.into_iter().chain(&self.stop);
+        let marks = setpoint.into_iter().chain(&self.turn);
         marks.map(|mark| mark.lead(now, number)).max().unwrap_or(0)
     }
 
@@ -181,13 +183,13 @@ impl SendOrder {
         true
     }
 
-    /// Notes a stop, which supersedes all setpoints before it.
-    pub(super) fn note_stop(&mut self, now: Instant, message: &Received) {
+    /// Notes a stop or a start, which supersedes all setpoints before it.
+    pub(super) fn note_turn(&mut self, now: Instant, message: &Received) {
         if let Some(number) = number_of(message)
             && let Some(client) = self.client(now, message.source)
-            && client.stop.is_none_or(|stop| stop.lead(now, number) == 0)
+            && client.turn.is_none_or(|turn| turn.lead(now, number) == 0)
         {
-            client.stop = Some(Mark { number, at: now });
+            client.turn = Some(Mark { number, at: now });
         }
     }
 
@@ -274,7 +276,7 @@ mod tests {
 
         fn stop(&mut self, number: u16) {
             self.order
-                .note_stop(self.now, &message(&Standby {}, Some(number)));
+                .note_turn(self.now, &message(&Standby {}, Some(number)));
         }
     }
 

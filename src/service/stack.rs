@@ -262,13 +262,18 @@ impl Stack {
     }
 
     fn handle_control(&mut self, now: Instant, message: &Received) -> Handled {
-        if is_stop(&message.payload) && self.control.standing().obeys(message.source) {
-            self.order.note_stop(now, message);
-        }
+        let (client, before) = (message.source, *self.control.standing());
         let is_alive = |client| self.life.is_alive(now, client);
         let control = &mut self.control;
         let handled = control.handle_message(now, message, is_alive, &mut self.out);
-        self.watch_setter(now, message.source);
+        let after = self.control.standing();
+        let begins = !before.acts_for(client) && after.acts_for(client)
+            || !before.obeys(client) && after.obeys(client);
+        let stops = before.obeys(client) && is_stop(&message.payload);
+        if begins || stops {
+            self.order.note_turn(now, message);
+        }
+        self.watch_setter(now, client);
         handled
     }
 

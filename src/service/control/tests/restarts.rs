@@ -12,7 +12,6 @@ use crate::service::stack_rig::US;
 use crate::service::{
     Context, Discovery, Handled, Handlers, Kind, Profile, Scope, Service, StopCause, Timing,
 };
-use crate::wire::{Broadcast, Priority};
 
 /// The numbers of two starts of a client.
 const OLD: u64 = 7;
@@ -22,6 +21,13 @@ impl Rig {
     /// The client tells its incarnation, as it does before it requests control.
     fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
         self.hear(client, &QueryIncarnation { incarnation })
+    }
+
+    /// Handles a message of `FIRST` with this number.
+    fn hear_numbered<M: Message>(&mut self, number: u16, message: &M) {
+        self.number = Some(number);
+        self.hear(FIRST, message);
+        self.number = None;
     }
 
     /// Lets the time pass; whenever the client is asked for its incarnation, it answers. Returns
@@ -255,6 +261,12 @@ fn a_client_that_offers_the_service_and_has_not_told_its_incarnation_is_asked_fo
 
 /// A ready component of `FIRST` that counts its commands.
 fn moving() -> (Rig, Arc<AtomicU32>) {
+    let (rig, commands) = idle();
+    (rig.drive(), commands)
+}
+
+/// A component that counts its commands.
+fn idle() -> (Rig, Arc<AtomicU32>) {
     let commands = Arc::new(AtomicU32::new(0));
     let count = Arc::clone(&commands);
     let mover = Handlers::new(list_manager::LATEST)
@@ -263,7 +275,7 @@ fn moving() -> (Rig, Arc<AtomicU32>) {
     let rig = Rig::new(vec![Box::new(mover)], |stack| {
         stack.management(Management::new())
     });
-    (rig.drive(), commands)
+    (rig, commands)
 }
 
 /// Notes why it is stopped.
@@ -298,26 +310,40 @@ fn what_moves_is_told_that_its_client_has_restarted() {
 #[test]
 fn a_new_incarnation_counts_its_messages_anew() {
     let (mut rig, commands) = moving();
-    let hear = |rig: &mut Rig, message: bytes::Bytes, sequence: u16| {
-        let message = Received {
-            source: FIRST,
-            destination: US,
-            to: US,
-            priority: Priority::Standard,
-            broadcast: Broadcast::None,
-            payload: message,
-            sequence: Some(sequence),
-            path: None,
-        };
-        rig.stack.handle_message(rig.now, &message);
-        rig.said();
-    };
-    let command = DeleteElement::default().encode().unwrap();
-    hear(&mut rig, command.clone(), 499);
-    hear(&mut rig, Standby.encode().unwrap(), 500);
+    let command = DeleteElement::default();
+    rig.hear_numbered(499, &command);
+    rig.hear_numbered(500, &Standby);
     rig.introduce(FIRST, NEW);
     rig.request(FIRST, 100);
     rig.hear(FIRST, &Resume);
-    hear(&mut rig, command, 1);
+    rig.hear_numbered(1, &command);
     assert_eq!(commands.load(Relaxed), 2);
+}
+
+/// A network may deliver a command seconds after it was sent. Then its client has asked for control
+/// again, and to resume, because the component has restarted.
+#[test]
+fn a_command_that_was_sent_before_its_client_took_the_component_up_moves_nothing() {
+    let command = DeleteElement::default();
+    let request = RequestControl {
+        authority_code: 100,
+    };
+    let (mut rig, commands) = idle();
+    rig.hear_numbered(11, &request);
+    rig.hear_numbered(12, &Resume);
+    assert_eq!(rig.state(), State::Ready);
+    rig.hear_numbered(10, &command);
+    assert_eq!(commands.load(Relaxed), 0);
+    rig.hear_numbered(13, &command);
+    assert_eq!(commands.load(Relaxed), 1);
+
+    // It takes over what another client has made ready.
+    let (mut rig, commands) = idle();
+    rig.hear(SECOND, &RequestControl { authority_code: 50 });
+    rig.hear(SECOND, &Resume);
+    rig.hear_numbered(11, &request);
+    rig.hear_numbered(10, &command);
+    assert_eq!(commands.load(Relaxed), 0);
+    rig.hear_numbered(12, &command);
+    assert_eq!(commands.load(Relaxed), 1);
 }
