@@ -42,6 +42,7 @@ mod loader;
 pub mod lua;
 pub mod machine;
 pub mod model;
+pub mod permission;
 pub mod presence;
 pub mod python;
 mod resolve;

@@ -10,6 +10,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::behaviour::StateMachine;
+use crate::permission::Permission;
 pub use crate::source::Location;
 
 /// A service's version, `major.minor`.
@@ -100,6 +101,9 @@ pub struct Message {
     pub is_command: bool,
     /// `deprecated`: newer services have another message for the purpose.
     pub is_deprecated: bool,
+    /// The right that its sender needs: the attributes `permission`, `authority` and `granted` of our own
+    /// namespace. `None` if the definition does not state it.
+    pub permission: Option<Permission>,
     /// The author's text, white space folded.
     pub description: String,
     /// Fields between the code and the body. `None` for the usual header, whose only field is the

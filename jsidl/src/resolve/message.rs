@@ -7,6 +7,8 @@ use super::item::{measure, text};
 use super::{Resolved, Resolver, Whole};
 use crate::check;
 use crate::model::{Item, Message};
+use crate::permission::{self, Permission};
+use crate::source::Span;
 use crate::syntax::{Content, Declaration, EventDef, MessageDef, Section, TypeSetIndex};
 
 impl Resolver<'_> {
@@ -21,17 +23,36 @@ impl Resolver<'_> {
         let body = self.section(scope, &message.body);
         let footer = self.section(scope, &message.footer);
         let header = self.header(&message.header, header?.as_deref())?;
-        Some(Arc::new(Message {
+        let message = Arc::new(Message {
             name: declaration.name.clone(),
             code: message.code,
             is_command: message.is_command,
             is_deprecated: message.is_deprecated,
+            permission: message.permission.clone(),
             description: message.description.clone(),
             header,
             body: self.taken(body?, &message.body)?,
             footer: self.taken(footer?, &message.footer)?,
             location: self.location(declaration.span),
-        }))
+        });
+        self.field_of_permission(declaration.span, &message)
+            .then_some(message)
+    }
+
+    /// Checks that a node finds the field that belongs to the permission of a message.
+    fn field_of_permission(&mut self, span: Span, message: &Message) -> bool {
+        let Some(field) = message.permission.as_ref().and_then(Permission::field) else {
+            return true;
+        };
+        let is_found = permission::place_of(message, field).is_some();
+        if !is_found {
+            let text = format!(
+                "a node cannot find the field `{field}`: name an `unsigned byte` in the body, a record \
+                 without optional fields, with nothing of variable length before it"
+            );
+            self.report.error(span, text);
+        }
+        is_found
     }
 
     /// Resolves an `event_def`, only to find its mistakes.

@@ -16,6 +16,9 @@ use crate::spelling::shortened;
 /// JSIDL+: wraps several services into one file and adds data of a diagram editor.
 const PLUS: &str = "urn:jaus:jsidl:plus";
 
+/// Namespace of our attributes beyond JSIDL.
+pub(super) const EXTENSION: &str = "urn:jaus-rs:jsidl";
+
 /// Maximum length of names and URNs: findings repeat them.
 const LONGEST_NAME: usize = 200;
 

@@ -2,15 +2,12 @@
 
 use roxmltree::Node as Xml;
 
-use super::element::{Children, Reader};
+use super::element::{Children, EXTENSION, Reader};
 use super::{
     ChoiceEnum, Construct, FormatEnum, Kind, ScalarField, ScaleRange, SubField, ValueEnum,
     ValueRange, ValueSet, Values,
 };
 use crate::model::Rounding;
-
-/// Namespace of our attributes beyond JSIDL.
-const EXTENSION: &str = "urn:jaus-rs:jsidl";
 
 impl Reader<'_> {
     /// Reads type, units and meaning of a `fixed_field` or `type_and_units_enum`.

@@ -2,9 +2,10 @@
 
 use roxmltree::Node as Xml;
 
-use super::element::{Children, Reader, fold};
+use super::element::{Children, EXTENSION, Faulty, Reader, fold};
 use super::{Construct, Content, Declaration, DeclarationKind, EventDef, MessageDef, Section};
 use crate::grammar;
+use crate::permission::Permission;
 use crate::source::Spanned;
 
 impl Reader<'_> {
@@ -58,12 +59,14 @@ impl Reader<'_> {
         // Optional since edition 1.1.
         let is_command = self.flag(xml, "is_command");
         let is_deprecated = self.flag(xml, "deprecated");
+        let permission = self.permission(xml);
         let description = children.find("description");
         let [header, body, footer] = self.sections(&children);
         Some(MessageDef {
             code: code?,
             is_command: is_command.ok()?.unwrap_or(false),
             is_deprecated: is_deprecated.ok()?.unwrap_or(false),
+            permission: permission.ok()?,
             description: description
                 .map(|it| self.description(it))
                 .unwrap_or_default(),
@@ -71,6 +74,42 @@ impl Reader<'_> {
             body: body?,
             footer: footer?,
         })
+    }
+
+    /// Reads the attributes `permission`, `authority` and `granted` of our own namespace.
+    fn permission(&mut self, xml: Xml<'_, '_>) -> Result<Option<Permission>, Faulty> {
+        let [word, mut authority, mut granted] =
+            ["permission", "authority", "granted"].map(|it| self.attribute(xml, (EXTENSION, it)));
+        let words = Permission::WORDS;
+        let known = words.each_ref().map(|(word, it)| (*word, it));
+        let permission = match &word {
+            Some(word) => Some(self.word(word, "permission", &known).ok_or(Faulty)?.clone()),
+            None => None,
+        };
+        let permission = match permission {
+            Some(Permission::Control { .. }) => Some(Permission::Control {
+                authority: authority.take().map(|it| it.value),
+            }),
+            Some(Permission::Answer { .. }) => {
+                let Some(field) = granted.take() else {
+                    let message = "an answer lacks the attribute `granted`: name the field that is 0 if \
+                                   control is granted";
+                    self.report.error(self.span(xml), message);
+                    return Err(Faulty);
+                };
+                Some(Permission::Answer {
+                    granted: field.value,
+                })
+            }
+            other => other,
+        };
+        if let Some(field) = authority.or(granted) {
+            let message = "`authority` belongs to `permission=\"control\"`, and `granted` to \
+                           `permission=\"answer\"`: remove it";
+            self.report.error(field.span, message);
+            return Err(Faulty);
+        }
+        Ok(permission)
     }
 
     fn code(&mut self, text: &Spanned<String>) -> Option<u16> {

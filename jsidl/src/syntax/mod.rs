@@ -18,6 +18,7 @@ use std::sync::Arc;
 use crate::behaviour::StateMachine;
 use crate::expr::Expression;
 use crate::model::{GroupKind, Id, Number, Rounding, Unsigned, Version};
+use crate::permission::Permission;
 use crate::source::{Span, Spanned};
 
 pub(crate) use limits::{LARGEST, excess};
@@ -233,6 +234,7 @@ pub(crate) struct MessageDef {
     pub(crate) code: u16,
     pub(crate) is_command: bool,
     pub(crate) is_deprecated: bool,
+    pub(crate) permission: Option<Permission>,
     pub(crate) description: String,
     pub(crate) header: Section,
     pub(crate) body: Section,

@@ -24,6 +24,7 @@ mod grammar;
 mod loading;
 mod lua;
 mod machines;
+mod permissions;
 mod ros;
 mod round_trips;
 mod schema;

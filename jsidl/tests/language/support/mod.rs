@@ -21,6 +21,7 @@ pub(crate) fn message(code: u16, name: &str, body: Option<Item>) -> Message {
         code,
         is_command: false,
         is_deprecated: false,
+        permission: None,
         description: String::new(),
         header: None,
         body,

@@ -1,0 +1,283 @@
+//! The right that the sender of a message needs, as the definitions state it.
+//!
+//! JSIDL says of a message at most that only the controlling client may send it (`is_command`). That is
+//! too little for a node that decides, for each sender, which messages may pass: a request for control,
+//! a change of the clock and a new waypoint are all commands. So a `message_def` may have attributes of
+//! our own namespace:
+//!
+//! ```xml
+//! <message_def name="RequestControl" message_id="000D" is_command="true"
+//!     xmlns:own="urn:jaus-rs:jsidl" own:permission="control" own:authority="AuthorityCode">
+//! ```
+//!
+//! | `permission` | the message |
+//! |---|---|
+//! | `observe` | changes nothing: a query, a report, an answer, a subscription |
+//! | `answer` | says whether control is granted: `granted` names the field that is 0 then |
+//! | `release` | ends what its sender itself has |
+//! | `emergency` | stops |
+//! | `clear-emergency` | ends a stop |
+//! | `command` | changes or moves something |
+//! | `control` | asks for control; `authority` names the field with the authority that it asks for |
+//! | `configure` | shuts a component down, or changes its set-up |
+//!
+//! A message that a service receives needs the attribute, unless it is marked as a query: no command,
+//! and answered by a report of the same service. What a service only sends is a report. Nothing is
+//! guessed: the message has no permission otherwise, and a node refuses it.
+//!
+//! Where several services give one code to different messages, the greatest right is needed: a node
+//! cannot tell which of them is meant.
+
+mod carried;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use crate::library::Library;
+use crate::model::{GroupKind, Item, Message, Number, Service, Shape, Unsigned};
+
+/// What the sender of a message must be allowed to do; the greater of two rights comes later.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Permission {
+    /// To query, report and subscribe.
+    Observe,
+    /// To answer a request for control.
+    Answer {
+        /// The field that is 0 if control is granted.
+        granted: String,
+    },
+    /// To end what the sender itself has.
+    Release,
+    /// To set an emergency.
+    Emergency,
+    /// To command.
+    Command,
+    /// To clear an emergency.
+    ClearEmergency,
+    /// To shut down and to set up.
+    Configure,
+    /// To take control.
+    Control {
+        /// The field with the authority that is asked for; `None` if any will do.
+        authority: Option<String>,
+    },
+}
+
+impl Permission {
+    /// The words of the attribute; their fields have attributes of their own.
+    pub(crate) const WORDS: [(&str, Self); 8] = [
+        ("observe", Self::Observe),
+        (
+            "answer",
+            Self::Answer {
+                granted: String::new(),
+            },
+        ),
+        ("release", Self::Release),
+        ("emergency", Self::Emergency),
+        ("command", Self::Command),
+        ("clear-emergency", Self::ClearEmergency),
+        ("configure", Self::Configure),
+        ("control", Self::Control { authority: None }),
+    ];
+}
+
+impl Permission {
+    /// The field that a node reads, to decide on the message or to record it.
+    pub(crate) fn field(&self) -> Option<&str> {
+        match self {
+            Self::Control { authority } => authority.as_deref(),
+            Self::Answer { granted } => Some(granted),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Permission {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_same = |other: &Self| std::mem::discriminant(other) == std::mem::discriminant(self);
+        let words = Self::WORDS;
+        let word = words.iter().find(|(_, it)| is_same(it));
+        f.write_str(word.map_or("", |(word, _)| word))
+    }
+}
+
+/// The permissions of all messages of some services.
+#[derive(Debug, Default)]
+pub struct Permissions {
+    rows: BTreeMap<u16, Row>,
+    /// The codes that each service receives, whatever its version.
+    services: BTreeMap<Arc<str>, BTreeSet<u16>>,
+    /// Messages that a service receives, and of which no definition says what they need; each once.
+    pub missing: Vec<Arc<Message>>,
+}
+
+/// What is known of a message code.
+#[derive(Debug)]
+struct Row {
+    needs: Permission,
+    /// The place of its field, in octets from the beginning of the message.
+    place: Option<usize>,
+    names: BTreeSet<String>,
+    /// The layouts of messages with this code that carry others.
+    carries: BTreeSet<String>,
+}
+
+impl Permissions {
+    /// Collects the permissions of all messages of these services.
+    pub fn of(library: &Library) -> Self {
+        let mut found = Self::default();
+        let stated = stated(library);
+        let mut missing = BTreeSet::new();
+        for service in library.services() {
+            let received = found.services.entry(service.id.urn.clone()).or_default();
+            received.extend(service.inputs.iter().map(|it| it.code));
+            for message in &service.inputs {
+                let needs = stated
+                    .get(&key(message))
+                    .cloned()
+                    .or_else(|| is_query(service, message).then_some(Permission::Observe));
+                match needs {
+                    Some(needs) => found.add(message, needs, true),
+                    None if missing.insert(key(message)) => found.missing.push(message.clone()),
+                    None => {}
+                }
+            }
+        }
+        for message in library.services().flat_map(|service| &service.outputs) {
+            // A client sends commands, too: those that a service receives are judged there.
+            let is_received = missing.contains(&key(message));
+            let needs = stated.get(&key(message)).cloned();
+            let needs = needs.or_else(|| (!is_received).then_some(Permission::Observe));
+            if let Some(needs) = needs {
+                found.add(message, needs, false);
+            }
+        }
+        found
+            .rows
+            .retain(|code, _| !missing.iter().any(|(it, _)| it == code));
+        found
+    }
+
+    fn add(&mut self, message: &Message, needs: Permission, is_received: bool) {
+        let place = needs.field().and_then(|field| place_of(message, field));
+        let carries = is_received.then(|| carried::layout(message)).flatten();
+        let row = self.rows.entry(message.code).or_insert_with(|| Row {
+            needs: Permission::Observe,
+            place: None,
+            names: BTreeSet::new(),
+            carries: BTreeSet::new(),
+        });
+        if needs > row.needs {
+            (row.needs, row.place) = (needs, place);
+        }
+        row.names.insert(message.name.clone());
+        row.carries.extend(carries);
+    }
+}
+
+/// A line for each message code, and for each service:
+///
+/// ```text
+/// 000D control@2 RequestControl
+/// 01F0 observe CreateEvent [4m4]
+/// service urn:jaus:jss:core:Time 0011 2011
+/// ```
+///
+/// The code in hexadecimal digits; the right, with the place of the field that belongs to it; the names,
+/// separated by commas; and for a message that carries others, the layouts that it may have. A service
+/// has the codes that it receives.
+impl fmt::Display for Permissions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (code, row) in &self.rows {
+            let mut line = format!("{code:04X} {}", row.needs);
+            if let Some(place) = row.place {
+                write!(line, "@{place}")?;
+            }
+            let names: Vec<_> = row.names.iter().map(String::as_str).collect();
+            write!(line, " {}", names.join(","))?;
+            for layout in &row.carries {
+                write!(line, " [{layout}]")?;
+            }
+            writeln!(f, "{line}")?;
+        }
+        for (urn, codes) in &self.services {
+            let codes: Vec<_> = codes.iter().map(|code| format!("{code:04X}")).collect();
+            writeln!(f, "service {urn} {}", codes.join(" "))?;
+        }
+        Ok(())
+    }
+}
+
+/// A message, whatever services declare it.
+fn key(message: &Message) -> (u16, String) {
+    (message.code, message.name.clone())
+}
+
+/// What the definitions state; of several statements the greatest right counts.
+fn stated(library: &Library) -> BTreeMap<(u16, String), Permission> {
+    let mut stated = BTreeMap::new();
+    for message in library.services().flat_map(|it| it.messages()) {
+        if let Some(needs) = &message.permission {
+            let known = stated.entry(key(message)).or_insert_with(|| needs.clone());
+            if needs > known {
+                known.clone_from(needs);
+            }
+        }
+    }
+    stated
+}
+
+/// Whether a service answers this message by a report: then it changes nothing.
+fn is_query(service: &Service, message: &Message) -> bool {
+    let subject = message.name.strip_prefix("Query");
+    let answers = |report: &Message| report.name.strip_prefix("Report") == subject;
+    !message.is_command && subject.is_some() && service.outputs.iter().any(|it| answers(it))
+}
+
+/// The place of a field of one octet, which stands after fields of fixed sizes at the head of the body,
+/// in octets from the beginning of the message.
+pub(crate) fn place_of(message: &Message, field: &str) -> Option<usize> {
+    let body = message.body.as_ref().filter(|_| message.header.is_none())?;
+    let mut place = size_of::<u16>();
+    let members = fixed_members(body)?;
+    for member in members {
+        if member.name == field {
+            let is_octet = matches!(&member.shape, Shape::Scalar(it) if it.number == Number::Unsigned(Unsigned::U8));
+            return is_octet.then_some(place);
+        }
+        place += fixed_size(&member.shape)?;
+    }
+    None
+}
+
+/// The members of a record without a presence vector.
+fn fixed_members(item: &Item) -> Option<&[Item]> {
+    match &item.shape {
+        Shape::Group(group) if group.presence.is_none() && group.kind == GroupKind::Record => {
+            Some(&group.members)
+        }
+        _ => None,
+    }
+}
+
+/// Octets on the wire; `None` if they vary.
+fn fixed_size(shape: &Shape) -> Option<usize> {
+    match shape {
+        Shape::Scalar(scalar) => Some(scalar.number.size()),
+        Shape::Bits(bits) => Some(bits.base.size()),
+        Shape::FixedString { length } => usize::try_from(*length).ok(),
+        Shape::Group(group) if group.presence.is_none() => {
+            group.members.iter().map(|it| fixed_size(&it.shape)).sum()
+        }
+        Shape::Array(array) => {
+            let elements = array.dimensions.iter().try_fold(1_usize, |all, &it| {
+                all.checked_mul(usize::try_from(it).ok()?)
+            })?;
+            fixed_size(&array.element.shape)?.checked_mul(elements)
+        }
+        _ => None,
+    }
+}
