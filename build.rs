@@ -1,5 +1,11 @@
 //! Generates typed messages from the service definitions in `jsidl/services`: the core set, and the
-//! sets whose feature is on.
+//! sets whose feature is on; and the table of what the sender of each message of all sets needs.
+
+use std::path::PathBuf;
+use std::{env, fs};
+
+use jsidl::Loader;
+use jsidl::permission::Permissions;
 
 /// The features, with the modules that each adds and the beginnings of their services' URNs.
 const SETS: &[(&str, &[(&str, &str)])] = &[
@@ -35,11 +41,29 @@ fn main() {
         // Our own part of it, which every component offers.
         .module("core", "urn:jaus-rs:core:");
     for (feature, modules) in SETS {
-        if std::env::var_os(format!("CARGO_FEATURE_{feature}")).is_some() {
+        if env::var_os(format!("CARGO_FEATURE_{feature}")).is_some() {
             for (module, urn) in *modules {
                 build = build.module(module, urn);
             }
         }
     }
     build.run();
+    permissions();
+}
+
+/// Writes the table of permissions, for `src/rights`.
+fn permissions() {
+    let mut loader = Loader::new();
+    loader.catalogue();
+    let permissions = Permissions::of(&loader.load().library);
+    for message in &permissions.missing {
+        let (name, place) = (&message.name, &message.location);
+        println!("cargo::error={place}: {name} lacks `own:permission`");
+    }
+    let folder = env::var_os("OUT_DIR")
+        .map(PathBuf::from)
+        .unwrap_or_default();
+    if let Err(error) = fs::write(folder.join("permissions.txt"), permissions.to_string()) {
+        println!("cargo::error=permissions.txt: {error}");
+    }
 }

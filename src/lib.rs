@@ -7,6 +7,7 @@
 //! | read and write messages | [`messages`], [`codec`] |
 //! | run a node and see raw messages | [`node`] |
 //! | embed the protocol where there is no tokio | [`endpoint`], [`service`] |
+//! | decide what a sender may do | [`rights`] |
 //! | inspect datagrams | [`wire`]; the crate `jaus-view` for captures and JSON |
 //! | look up the differences of other implementations | [`peer`] |
 //!
@@ -14,7 +15,7 @@
 //! systems of the Reference Architecture 3.x. The command line tool `jaus` is `jaus-cli`.
 //!
 //! Modules depend only on those below them: `component`, then `service` and `node`, then `link`,
-//! `endpoint`, `peer` and `messages`, then `wire` and `codec`, then `address`. `service` and
+//! `endpoint`, `rights`, `peer` and `messages`, then `wire` and `codec`, then `address`. `service` and
 //! `endpoint`, and all modules below them, open no socket and read no clock.
 #![forbid(unsafe_code)]
 // Without a node, links to what needs one lead nowhere; with it they are checked.
@@ -34,6 +35,7 @@ pub mod node;
 pub mod peer;
 #[doc(hidden)]
 pub mod random;
+pub mod rights;
 pub mod service;
 pub mod wire;
 

@@ -15,6 +15,8 @@ use ipnet::IpNet;
 use super::{Counter, Remote};
 use crate::address::{JausId, ParseIdError};
 use crate::as_text::serde_as_text;
+use crate::rights::{self, Grant, Table, Unaccepted};
+use crate::wire::Frame;
 
 /// Allow and deny lists. Deny wins over allow. If an allow list is not empty, everything that is
 /// not on it is denied; empty lists admit everything.
@@ -24,6 +26,7 @@ use crate::as_text::serde_as_text;
 /// allow_subsystems = ["101", "200-299"]
 /// deny_networks = ["10.0.9.0/24", "fd00:9::/32"]
 /// bind = ["60.255.255@192.168.7.2"]
+/// grants = ["60 control=127", "65535.255.255 observe"]
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -44,6 +47,12 @@ pub struct Access {
     /// a serial line. Secure links are exempt, because they check the ids of each key. Flag:
     /// `--bind`.
     pub bind: Vec<Binding>,
+    /// What ids may do that come by plain links, in the words of [`rights`](crate::rights):
+    /// `["60 control=127", "65535.255.255 observe"]`. The first entry that an id matches counts, and an
+    /// id without one is refused. Without entries everybody may do everything. Ids are not proven: who
+    /// is on the network and forges one has its rights, unless [`bind`](Self::bind) keeps it out.
+    /// Secure links are exempt, because they have rules for each key. Flag: `--grant`.
+    pub grants: Vec<Grant>,
 }
 
 impl Access {
@@ -73,6 +82,17 @@ impl Access {
             Remote::Line => false,
             Remote::Session(_) => true,
         }
+    }
+
+    /// Checks what a message needs that comes from this remote end.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub fn check_rights(&self, frame: &Frame, from: Remote) -> Result<(), Unaccepted> {
+        if self.grants.is_empty() || matches!(from, Remote::Session(_)) {
+            return Ok(());
+        }
+        rights::check_by_grants(&self.grants, frame, &Table::default())
     }
 
     /// Adds an entry to the allow list of its kind.

@@ -45,6 +45,8 @@ counters! {
     Duplicate = "dropped: duplicate",
     /// Dropped: a message from an id that `access.bind` binds to other networks.
     BoundElsewhere = "dropped: id bound to another network",
+    /// Dropped: a message to which `access.grants` gives its sender no right.
+    NotGranted = "dropped: sender has no right to it",
     NetworkDenied = "dropped: network not allowed",
     SubsystemDenied = "dropped: subsystem not allowed",
     MessageRate = "dropped: too many messages from one source",

@@ -15,6 +15,7 @@ use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
+use crate::rights::Table;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
 
 impl Endpoint {
@@ -147,6 +148,7 @@ impl Endpoint {
         let seen = self.heard.fingerprint(frame);
         self.refuse_own(arrival, seen)?;
         self.refuse_misplaced(arrival)?;
+        self.refuse_without_right(arrival)?;
         let passes = self.is_passed_on(frame);
         let is_for_us = match self.check_receivers(frame, broadcast) {
             Err(_) if passes => false,
@@ -255,6 +257,19 @@ impl Endpoint {
             warn!(%id, from = %path.peer, "refused: `peers` pins this id to another address");
         }
         Err(Counter::PinnedElsewhere)
+    }
+
+    /// Refuses messages that their senders may not send. They are not acknowledged.
+    fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let (frame, path) = (arrival.frame, arrival.path);
+        let Err(reason) = self.config.access.check_rights(frame, path.peer) else {
+            return Ok(());
+        };
+        if self.warnings.is_due(arrival.now, Warning::NotGranted) {
+            let (id, name) = (frame.source, Table::default().name_of(&frame.payload));
+            warn!(%id, from = %path.peer, "refused {name}: {reason} (`access.grants`)");
+        }
+        Err(Counter::NotGranted)
     }
 
     /// Refuses a fragment whose sender is verified at another address, without acknowledging it: it

@@ -35,12 +35,13 @@ pub(super) enum Warning {
     TableFull,
     PinnedElsewhere,
     BoundElsewhere,
+    NotGranted,
     Unverified,
 }
 
 /// When each warning was last logged.
 #[derive(Debug, Default)]
-pub(super) struct Warnings([Option<Instant>; 7]);
+pub(super) struct Warnings([Option<Instant>; 8]);
 
 impl Warnings {
     /// Whether a warning may be logged again.

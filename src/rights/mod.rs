@@ -1,9 +1,13 @@
-//! What a trusted key may do: the words after the ids in a trust file.
+//! What a sender may do: one table of what each message needs, and the rules of each sender.
 //!
-//! | word | the key may |
+//! Every way into a node asks the same question: secure links for each key, bridges for each id, plain
+//! links for each network (`[access]`). [`Table`] answers what a message needs: the definitions state
+//! it, whatever sets of messages a program was built with. [`Rules`] are what a sender has:
+//!
+//! | word | the sender may |
 //! |---|---|
-//! | `observe` | query, subscribe, report, and set an emergency; every trusted key may |
-//! | `command` | send commands as well, and messages that no definition has |
+//! | `observe` | query, subscribe, report, end what is its own, and set an emergency; everybody may |
+//! | `command` | send commands as well |
 //! | `control=127` | send commands, and take control of components with an authority up to 127 |
 //! | `clear-emergency` | clear emergencies that it has set, and as the client in control those of clients that are gone |
 //! | `clear-emergency=any` | clear emergencies, also those of other clients |
@@ -11,34 +15,39 @@
 //! | `with=101.255.255,102.1.255` | exchange messages with these ids alone |
 //! | `only=PrimitiveDriver,D103h` | of all commands, send these alone |
 //! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries |
+//! | `also=D103h` | send these codes, too, although no definition states what they need; `also=any`: all of them |
 //!
-//! `only` and `except` name services, messages or message codes. All rules also apply to the message
-//! inside a request for an event, but not to those inside a list or a mission. Control, emergencies
-//! and configuration have words of their own: `only` does not concern them.
+//! `only` and `except` name services, messages or message codes. All rules also apply to the messages
+//! that a message carries: the query in a request for an event, the elements of a list, the messages of
+//! a mission. What a message carries must be in its first fragment, unless its sender may do everything.
+//! Control, emergencies and configuration have words of their own: `only` does not concern them.
 //!
-//! A message that is in no definition counts as a command: nobody knows what it does.
+//! What no definition states needs `also`: nobody knows what it does.
 //!
 //! Who may observe may set an emergency, because a stop must not fail for lack of a right, unless
 //! `except=SetEmergency` takes it away.
 
-mod known;
-mod permission;
+mod accept;
+mod carried;
 mod selection;
+mod table;
 
 use std::fmt;
 use std::str::FromStr;
 
+pub use accept::{Acceptance, Grant, GrantError, MOST_GRANTS, Unaccepted, one_or_more};
 use bytes::Bytes;
-use jaus::address::JausId;
-use jaus::codec::Message as _;
-use jaus::messages::core::{ConfirmControl, SetEmergency, confirm_control::ResponseCode};
-use jaus::wire::{DataControl, EncodeError, Frame, judp};
-
-pub(crate) use permission::clears_all;
-use permission::{Carried, Permission};
 pub use selection::{Selection, UnknownName};
+pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 
-/// What a trusted key may do. The default is to observe.
+use crate::address::JausId;
+use crate::codec::Message as _;
+use crate::messages::core::{ConfirmControl, SetEmergency, confirm_control::ResponseCode};
+use crate::wire::{DataControl, EncodeError, Frame, judp};
+pub(crate) use accept::check as check_by_grants;
+use carried::Carried;
+
+/// What a sender may do. The default is to observe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Rules {
@@ -58,6 +67,8 @@ pub struct Rules {
     pub only: Selection,
     /// Messages that it may not send.
     pub except: Selection,
+    /// Messages that it may send although no definition states what they need.
+    pub also: Selection,
 }
 
 /// Why a message is refused.
@@ -65,16 +76,16 @@ pub struct Rules {
 #[non_exhaustive]
 pub enum Refusal {
     /// The destination is not among [`Rules::with`].
-    #[error("its key may not exchange messages with this id")]
+    #[error("its sender may not exchange messages with this id")]
     Elsewhere,
     /// A command without [`Rules::command`].
-    #[error("its key may only observe: add `command` or `control=AUTHORITY` to its line")]
+    #[error("its sender may only observe: add `command` or `control=AUTHORITY` to its line")]
     Command,
     /// Control is requested without [`Rules::control`].
-    #[error("its key may not take control: add `control=AUTHORITY` to its line")]
+    #[error("its sender may not take control: add `control=AUTHORITY` to its line")]
     Control,
     /// Control is requested with too great an authority.
-    #[error("authority {asked}, but its key may take control with at most {most}")]
+    #[error("authority {asked}, but its sender may take control with at most {most}")]
     Authority {
         /// The requested authority.
         asked: u8,
@@ -82,24 +93,33 @@ pub enum Refusal {
         most: u8,
     },
     /// An emergency is cleared without [`Rules::clear_emergency`].
-    #[error("its key may not clear emergencies: add `clear-emergency` to its line")]
+    #[error("its sender may not clear emergencies: add `clear-emergency` to its line")]
     ClearEmergency,
     /// The emergencies of all clients are cleared without [`Rules::clear_any_emergency`].
     #[error(
-        "its key may not clear the emergencies of others: add `clear-emergency=any` to its line"
+        "its sender may not clear the emergencies of others: add `clear-emergency=any` to its line"
     )]
     ClearAnyEmergency,
     /// A component is configured without [`Rules::configure`].
-    #[error("its key may not shut down, reset or set the time: add `configure` to its line")]
+    #[error("its sender may not shut down, reset or set the time: add `configure` to its line")]
     Configure,
     /// A message that commands is for several ids, not all of which are among [`Rules::with`].
-    #[error("`with` in the line of its key does not cover all of these ids")]
+    #[error("`with` in the line of its sender does not cover all of these ids")]
     TooWide,
-    /// The message inside a request for an event is not within the first fragment.
-    #[error("its first fragment does not show the message that it carries")]
+    /// What it carries cannot be told.
+    #[error(
+        "it does not show the messages that it carries: is it malformed, or longer than a packet? Send \
+         shorter lists"
+    )]
     Hidden,
+    /// No definition states what it needs.
+    #[error(
+        "no definition states what this message needs: add `also=` with its code to the line of its \
+         sender"
+    )]
+    Unknown,
     /// The command is not among [`Rules::only`], or the message is among [`Rules::except`].
-    #[error("`only` or `except` in the line of its key excludes this message")]
+    #[error("`only` or `except` in the line of its sender excludes this message")]
     Excluded,
     /// The message is too short to have a message code.
     #[error("it has no message code")]
@@ -116,6 +136,7 @@ impl Rules {
             clear_emergency: true,
             clear_any_emergency: true,
             configure: true,
+            also: Selection::any(),
             ..Self::default()
         }
     }
@@ -129,55 +150,74 @@ impl Rules {
         }
     }
 
-    /// Checks a frame from the key. Later fragments pass: without the first one they are nothing.
+    /// Checks a frame from the sender; the table tells what messages need. Later fragments pass: without
+    /// the first one they are nothing.
     ///
     /// # Errors
     /// The rule that forbids it.
-    pub fn check(&self, frame: &Frame) -> Result<(), Refusal> {
+    pub fn check(&self, frame: &Frame, table: &Table) -> Result<(), Refusal> {
         if !self.may_reach(frame.destination) {
             return Err(Refusal::Elsewhere);
         }
         if frame.is_acknowledgement() || (is_later(frame) && !repeats_code(frame)) {
             return Ok(());
         }
-        let mut message = &frame.payload[..];
-        loop {
-            let (permission, carried) = self.check_message(message)?;
-            if permission != Permission::Observe && !self.covers(frame.destination) {
-                return Err(Refusal::TooWide);
-            }
-            message = match carried {
-                Carried::Message(carried) => carried,
-                // A whole message without one is malformed, and the component refuses it.
-                Carried::Missing if frame.flags.data() == DataControl::First => {
-                    return Err(Refusal::Hidden);
-                }
-                Carried::Missing | Carried::Nothing => return Ok(()),
-            };
-        }
+        self.check_message(&frame.payload, frame.destination, (table, carried::DEEPEST))
     }
 
-    /// Checks a message by itself; returns what it needs, and the message that it carries.
-    fn check_message<'m>(&self, message: &'m [u8]) -> Result<(Permission, Carried<'m>), Refusal> {
-        let code = message.first_chunk().ok_or(Refusal::NoCode)?;
-        let code = u16::from_le_bytes(*code);
-        let permission = Permission::of(code, message);
-        self.check_permission(permission)?;
-        let carried = permission::carried(code, message);
-        // Of a request that carries a command, the command counts.
-        let is_selected = permission != Permission::Command
-            || carried != Carried::Nothing
+    /// Checks a message, and those that it carries so many levels deep.
+    fn check_message(
+        &self,
+        message: &[u8],
+        to: JausId,
+        (table, depth): (&Table, usize),
+    ) -> Result<(), Refusal> {
+        let code = table::code_of(message).ok_or(Refusal::NoCode)?;
+        let permission = table.permission(message);
+        match permission {
+            Some(permission) => self.check_permission(permission)?,
+            None if self.also.contains(code) => {}
+            None => return Err(Refusal::Unknown),
+        }
+        let carried = table.carried(message);
+        let is_empty = matches!(&carried, Carried::Messages(carried) if carried.is_empty());
+        // Of a message that carries commands, these count.
+        let is_selected = !matches!(permission, Some(Permission::Command) | None)
+            || !is_empty
             || self.only.is_empty()
             || self.only.contains(code);
         if !is_selected || self.except.contains(code) {
             return Err(Refusal::Excluded);
         }
-        Ok((permission, carried))
+        let is_free = permission.is_some_and(Permission::is_free);
+        if !is_free && !self.covers(to) {
+            return Err(Refusal::TooWide);
+        }
+        match carried {
+            Carried::Messages(carried) if depth > 0 => carried
+                .into_iter()
+                .try_for_each(|message| self.check_message(message, to, (table, depth - 1))),
+            _ if is_empty || self.are_all() => Ok(()),
+            _ => Err(Refusal::Hidden),
+        }
+    }
+
+    /// Whether there is no message that they forbid. Where messages may go is checked apart.
+    fn are_all(&self) -> bool {
+        let with = self.with.clone();
+        *self
+            == Self {
+                with,
+                ..Self::everything()
+            }
     }
 
     fn check_permission(&self, permission: Permission) -> Result<(), Refusal> {
         let (allowed, refusal) = match permission {
-            Permission::Observe => return Ok(()),
+            Permission::Observe
+            | Permission::Answer { .. }
+            | Permission::Release
+            | Permission::Emergency => return Ok(()),
             Permission::Control { authority } => return self.check_authority(authority),
             Permission::Command => (self.command || self.control.is_some(), Refusal::Command),
             Permission::ClearEmergency => (self.clear_emergency, Refusal::ClearEmergency),
@@ -224,22 +264,11 @@ fn repeats_code(frame: &Frame) -> bool {
     frame.version.repeated_code_len() > 0
 }
 
-/// Whether an audit log holds this frame also if it passes: it, or the message that it carries,
-/// concerns control, an emergency or the configuration of a component.
-pub(crate) fn is_recorded(frame: &Frame) -> bool {
-    if is_later(frame) || frame.is_acknowledgement() {
-        return false;
-    }
-    let mut message = &frame.payload[..];
-    while let Some(code) = message.first_chunk() {
-        let code = u16::from_le_bytes(*code);
-        match permission::carried(code, message) {
-            _ if permission::is_recorded(code) => return true,
-            Carried::Message(carried) => message = carried,
-            Carried::Missing | Carried::Nothing => return false,
-        }
-    }
-    false
+/// Whether an audit log holds this frame also if it passes; later fragments, and acknowledgements, are
+/// not held. See [`Table::is_recorded`].
+#[must_use]
+pub fn is_recorded(frame: &Frame, table: &Table) -> bool {
+    !is_later(frame) && !frame.is_acknowledgement() && table.is_recorded(&frame.payload)
 }
 
 /// The answer to a refused request for control: a datagram with Confirm Control, as from the
@@ -262,7 +291,7 @@ pub enum RuleError {
     /// The word is unknown.
     #[error(
         "`{0}` is not a rule: write observe, command, control=AUTHORITY, clear-emergency, \
-         clear-emergency=any, configure, with=IDS, only=NAMES or except=NAMES"
+         clear-emergency=any, configure, with=IDS, only=NAMES, except=NAMES or also=CODES"
     )]
     Word(String),
     /// The authority is malformed.
@@ -289,7 +318,11 @@ impl FromStr for Rules {
 }
 
 impl Rules {
-    pub(crate) fn parse<'t>(words: impl Iterator<Item = &'t str>) -> Result<Self, RuleError> {
+    /// Reads these words. Names are those of the catalogue; other messages have codes alone.
+    ///
+    /// # Errors
+    /// The first word that is no rule.
+    pub fn parse<'t>(words: impl IntoIterator<Item = &'t str>) -> Result<Self, RuleError> {
         let mut rules = Self::default();
         for word in words {
             let (name, value) = word.split_once('=').unwrap_or((word, ""));
@@ -301,13 +334,15 @@ impl Rules {
                     (rules.clear_emergency, rules.clear_any_emergency) = (true, true);
                 }
                 ("configure", false) => rules.configure = true,
-                ("with" | "only" | "except", true) if value.is_empty() => {
+                ("with" | "only" | "except" | "also", true) if value.is_empty() => {
                     return Err(RuleError::Empty(name.to_owned()));
                 }
                 ("control", true) => rules.control = Some(authority(value)?),
                 ("with", true) => rules.with = ids(value)?,
                 ("only", true) => rules.only = value.parse()?,
                 ("except", true) => rules.except = value.parse()?,
+                ("also", true) if value == "any" => rules.also = Selection::any(),
+                ("also", true) => rules.also = value.parse()?,
                 _ => return Err(RuleError::Word(shortened(word))),
             }
         }
@@ -354,7 +389,12 @@ impl fmt::Display for Rules {
             let ids: Vec<_> = self.with.iter().map(JausId::to_string).collect();
             words.push(format!("with={}", ids.join(",")));
         }
-        for (name, selection) in [("only", &self.only), ("except", &self.except)] {
+        let selections = [
+            ("only", &self.only),
+            ("except", &self.except),
+            ("also", &self.also),
+        ];
+        for (name, selection) in selections {
             if !selection.is_empty() {
                 words.push(format!("{name}={selection}"));
             }
@@ -363,5 +403,5 @@ impl fmt::Display for Rules {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "mobility"))]
 mod tests;

@@ -1,11 +1,13 @@
+use std::collections::BTreeMap;
+
 use bytes::Bytes;
-use jaus::codec::Message;
-use jaus::component::CLEAR_ALL;
-use jaus::messages::core::{
+
+use crate::codec::Message;
+use crate::messages::core::{
     ClearEmergency, QueryIdentification, RequestControl, SetEmergency, Shutdown, Standby,
 };
-use jaus::messages::mobility::{QueryVelocityState, SetTravelSpeed, SetWrenchEffort};
-use jaus::wire::{Flags, Version};
+use crate::messages::mobility::{QueryVelocityState, SetTravelSpeed, SetWrenchEffort};
+use crate::wire::{Flags, Version};
 
 use super::*;
 
@@ -17,7 +19,10 @@ fn frame(payload: impl Into<Bytes>) -> Frame {
 
 fn check(rules: &str, message: &impl Message) -> Result<(), Refusal> {
     let payload = message.encode().unwrap();
-    rules.parse::<Rules>().unwrap().check(&frame(payload))
+    rules
+        .parse::<Rules>()
+        .unwrap()
+        .check(&frame(payload), &Table::default())
 }
 
 fn request(authority_code: u8) -> RequestControl {
@@ -63,7 +68,7 @@ fn control_is_limited_by_authority() {
     assert_eq!(check("command", &request(1)), Err(Refusal::Control));
     let no_authority = frame(&b"\x0D\x00"[..]);
     let rules: Rules = "control=127".parse().unwrap();
-    assert!(rules.check(&no_authority).is_err());
+    assert!(rules.check(&no_authority, &Table::default()).is_err());
 }
 
 #[test]
@@ -124,7 +129,12 @@ fn only_and_except_select_by_service_message_and_code() {
 fn a_command_inside_an_event_needs_the_same_rights() {
     // Create Command Event: request 1, 10 s, a Set Wrench Effort of 3 octets.
     let event = frame(&b"\xF6\x01\x01\x0A\0\0\0\x04\0\0\0\x05\x04\0\0"[..]);
-    let check = |rules: &str| rules.parse::<Rules>().unwrap().check(&event);
+    let check = |rules: &str| {
+        rules
+            .parse::<Rules>()
+            .unwrap()
+            .check(&event, &Table::default())
+    };
     assert_eq!(check(""), Err(Refusal::Command));
     assert_eq!(check("command"), Ok(()));
     assert_eq!(check("command only=SetWrenchEffort"), Ok(()));
@@ -135,56 +145,242 @@ fn a_command_inside_an_event_needs_the_same_rights() {
     );
     // Create Event: request 1, periodic, a Query Velocity State.
     let event = frame(&b"\xF0\x01\x01\0\0\x01\x04\0\0\0\x04\x24\0\0"[..]);
-    let check = |rules: &str| rules.parse::<Rules>().unwrap().check(&event);
+    let check = |rules: &str| {
+        rules
+            .parse::<Rules>()
+            .unwrap()
+            .check(&event, &Table::default())
+    };
     assert_eq!(check(""), Ok(()));
     assert_eq!(check("except=QueryVelocityState"), Err(Refusal::Excluded));
 }
 
 #[test]
-fn what_no_definition_has_needs_the_right_to_command() {
-    let (observer, commander) = (Rules::default(), "command".parse::<Rules>().unwrap());
+fn what_no_definition_states_needs_a_right_of_its_own() {
+    let all = "command control=255 clear-emergency=any configure";
     for code in [0xDABCu16, 0xEABC, 0xFABC, 0x1ABC, 0x2ABC, 0x4ABC] {
         let frame = frame(code.to_le_bytes().to_vec());
-        assert_eq!(observer.check(&frame), Err(Refusal::Command), "{code:04X}");
-        assert_eq!(commander.check(&frame), Ok(()), "{code:04X}");
+        let check = |rules: &str| {
+            rules
+                .parse::<Rules>()
+                .unwrap()
+                .check(&frame, &Table::default())
+        };
+        assert_eq!(check("observe"), Err(Refusal::Unknown), "{code:04X}");
+        assert_eq!(check(all), Err(Refusal::Unknown), "{code:04X}");
+        assert_eq!(check(&format!("observe also={code:04X}h")), Ok(()));
+        assert_eq!(check("observe also=any"), Ok(()));
+        assert_eq!(Rules::everything().check(&frame, &Table::default()), Ok(()));
     }
-    assert_eq!(observer.check(&frame(&b"\x05"[..])), Err(Refusal::NoCode));
+    // It gives no right to messages whose definitions state what they need.
+    assert_eq!(
+        check("also=0405h", &SetWrenchEffort::default()),
+        Err(Refusal::Command)
+    );
+    let nothing = frame(&b"\x05"[..]);
+    assert_eq!(
+        Rules::default().check(&nothing, &Table::default()),
+        Err(Refusal::NoCode)
+    );
+}
+
+/// The whole catalogue: what each message of it needs, and that no lesser right will do.
+#[test]
+fn every_message_of_the_catalogue_needs_the_right_that_its_definition_states() {
+    let lines = include_str!(concat!(env!("OUT_DIR"), "/permissions.txt")).lines();
+    let messages: Vec<_> = lines.filter(|it| !it.starts_with("service ")).collect();
+    let table = Table::default();
+    assert_eq!(
+        table.codes().count(),
+        messages.len(),
+        "each line can be read"
+    );
+    let mut counts = BTreeMap::new();
+    for line in messages {
+        let words: Vec<_> = line.split(' ').collect();
+        let code = u16::from_str_radix(words[0], 16).unwrap();
+        let (right, place) = words[1].split_once('@').unwrap_or((words[1], ""));
+        *counts.entry(right).or_insert(0) += 1;
+        let mut message = code.to_le_bytes().to_vec();
+        // Empty lists and requests, and the authority 9.
+        message.extend([0; 64]);
+        if let Ok(place) = place.parse::<usize>() {
+            message[place] = 9;
+        }
+        let check = |rules: &str| {
+            rules
+                .parse::<Rules>()
+                .unwrap()
+                .check(&frame(message.clone()), &Table::default())
+        };
+        let (enough, lacking) = match right {
+            "observe" | "answer" | "release" | "emergency" => (vec!["", "observe"], Vec::new()),
+            "command" => (
+                vec!["command", "control=0"],
+                vec!["", "clear-emergency=any configure"],
+            ),
+            "clear-emergency" => (vec!["clear-emergency"], vec!["", "control=255 configure"]),
+            "configure" => (
+                vec!["configure"],
+                vec!["", "control=255 clear-emergency=any"],
+            ),
+            "control" if place.is_empty() => (vec!["control=0"], vec!["", "command configure"]),
+            "control" => (
+                vec!["control=9"],
+                vec!["", "control=8", "command configure"],
+            ),
+            other => panic!("{other}"),
+        };
+        for rules in enough {
+            assert_eq!(check(rules), Ok(()), "{line}: {rules}");
+        }
+        for rules in lacking {
+            assert!(check(rules).is_err(), "{line}: {rules}");
+        }
+    }
+    assert!(
+        counts["command"] > 100 && counts["observe"] > 300,
+        "{counts:?}"
+    );
+    assert_eq!(counts["control"], 4, "{counts:?}");
 }
 
 #[test]
-fn no_key_that_observes_sends_what_a_definition_calls_a_command() {
-    // Each ends what its sender has, or stops.
-    const HARMLESS: [&str; 7] = [
+fn nothing_that_a_definition_calls_a_command_is_free_but_what_ends_or_stops() {
+    let registry = crate::messages::registry();
+    let commands = registry.iter().filter(|it| it.is_command);
+    let free = commands.filter(|it| {
+        let permission = Table::default().permission(&it.code.to_le_bytes());
+        permission.is_none_or(Permission::is_free)
+    });
+    let mut free: Vec<_> = free.map(|it| it.name).collect();
+    free.sort_unstable();
+    free.dedup();
+    let expected = [
+        "CancelEvent",
+        "CreateEvent",
+        "RegisterServices",
         "ReleaseControl",
         "SetEmergency",
-        "RegisterServices",
-        "CreateEvent",
         "UpdateEvent",
-        "CancelEvent",
-        "ConfirmControl",
     ];
-    let rules = Rules::default();
-    let mut commands = 0;
-    for (code, name, is_command) in known::messages() {
-        let mut message = code.to_le_bytes().to_vec();
-        message.extend([0; 64]);
-        if is_command && !HARMLESS.contains(&name) {
-            commands += 1;
-            assert!(rules.check(&frame(message)).is_err(), "{code:04X} {name}");
-        } else if name.starts_with("Query") && known::is_command(code) == Some(false) {
-            assert_eq!(rules.check(&frame(message)), Ok(()), "{code:04X} {name}");
-        }
+    assert_eq!(free, expected);
+}
+
+#[test]
+fn the_elements_of_a_list_and_the_messages_of_a_mission_are_asked_in_turn() {
+    /// Set Element: request 1, one element: 1 between 0 and 0, a message of so many octets.
+    fn element(message: &[u8]) -> Vec<u8> {
+        let head = [0x1A, 0x04, 1, 1, 1, 0, 0, 0, 0, 0, 0];
+        [&head[..], &(message.len() as u16).to_le_bytes(), message].concat()
     }
-    assert!(commands > 100, "{commands} commands");
+    /// Spool Mission: mission 1 of 60.1.1, one task 1 with a message 1 to 101.1.1.
+    fn mission(message: &[u8]) -> Vec<u8> {
+        let head = [
+            0x00, 0x0E, 1, 0, 1, 1, 60, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 1, 101, 0,
+        ];
+        let length = (message.len() as u32).to_le_bytes();
+        [&head[..], &length, message, &[0, 0, 0]].concat()
+    }
+    let request = request(255).encode().unwrap();
+    let shutdown = Shutdown.encode().unwrap();
+    let speed = SetTravelSpeed::default().encode().unwrap();
+    for carrier in [element, mission] {
+        let check = |rules: &str, message: &[u8]| {
+            let frame = frame(carrier(message));
+            rules
+                .parse::<Rules>()
+                .unwrap()
+                .check(&frame, &Table::default())
+        };
+        assert_eq!(check("", &speed), Err(Refusal::Command));
+        assert_eq!(check("command", &speed), Ok(()));
+        assert_eq!(check("command", &request), Err(Refusal::Control));
+        let refused = Refusal::Authority {
+            asked: 255,
+            most: 9,
+        };
+        assert_eq!(check("control=9", &request), Err(refused));
+        assert_eq!(check("control=255", &shutdown), Err(Refusal::Configure));
+        assert_eq!(check("command", b"\xBC\xDA"), Err(Refusal::Unknown));
+        assert_eq!(
+            check("command except=SetTravelSpeed", &speed),
+            Err(Refusal::Excluded)
+        );
+        assert_eq!(check("command only=SetTravelSpeed", &speed), Ok(()));
+        assert_eq!(
+            check("command only=PrimitiveDriver", &speed),
+            Err(Refusal::Excluded)
+        );
+        // One inside the other, deeper than any that is of use.
+        let nested = (0..20).fold(speed.to_vec(), |inner, _| carrier(&inner));
+        assert_eq!(check("command", &nested), Err(Refusal::Hidden));
+        // Whatever is cut off, or has a count that is too great.
+        let whole = carrier(&speed);
+        let everything = Rules::everything();
+        for end in 2..whole.len() - 3 {
+            let cut = frame(whole[..end].to_vec());
+            assert!(
+                "command"
+                    .parse::<Rules>()
+                    .unwrap()
+                    .check(&cut, &Table::default())
+                    .is_err(),
+                "{end}"
+            );
+            assert_eq!(everything.check(&cut, &Table::default()), Ok(()), "{end}");
+        }
+        assert!(Table::default().is_recorded(&carrier(&request)));
+        assert!(!Table::default().is_recorded(&whole));
+    }
+}
+
+#[test]
+fn definitions_of_ones_own_add_rows_and_lessen_no_right() {
+    let lines = "D103 command SetLamp\n0405 observe Wrench\nD104 control@3 TakeLamp\n\
+                 service urn:example:Lamp D103 D104";
+    let table = Table::default().with(lines).unwrap();
+    let check = |rules: &str, message: &[u8]| {
+        let rules = rules.parse::<Rules>()?;
+        Ok::<_, RuleError>(rules.check(&frame(message.to_vec()), &table))
+    };
+    assert_eq!(check("", b"\x03\xD1"), Ok(Err(Refusal::Command)));
+    assert_eq!(check("command only=D103h", b"\x03\xD1"), Ok(Ok(())));
+    assert_eq!(
+        check("command only=D103h", b"\x05\x04\0\0"),
+        Ok(Err(Refusal::Excluded))
+    );
+    assert_eq!(check("", b"\x05\x04\0\0"), Ok(Err(Refusal::Command)));
+    let refused = Refusal::Authority {
+        asked: 200,
+        most: 99,
+    };
+    assert_eq!(check("control=99", b"\x04\xD1\0\xC8"), Ok(Err(refused)));
+    assert!(
+        "only=Lamp".parse::<Rules>().is_err(),
+        "the catalogue has no lamp"
+    );
+    for line in [
+        "D103",
+        "D103 command",
+        "D103 drive SetLamp",
+        "X command SetLamp",
+        "D103 command SetLamp 4m4",
+    ] {
+        let error = Table::default().with(line).unwrap_err().to_string();
+        assert!(error.contains(line), "{error}");
+    }
 }
 
 #[test]
 fn a_request_for_a_handoff_is_a_request_for_control() {
-    let handoff = |authority: u8| {
-        let [low, high] = permission::REQUEST_HANDOFF.to_le_bytes();
-        frame(vec![low, high, authority, 0])
+    let handoff = |authority: u8| frame(vec![0x31, 0xFF, authority, 0]);
+    let check = |rules: &str, authority| {
+        rules
+            .parse::<Rules>()
+            .unwrap()
+            .check(&handoff(authority), &Table::default())
     };
-    let check = |rules: &str, authority| rules.parse::<Rules>().unwrap().check(&handoff(authority));
     assert_eq!(check("observe", 255), Err(Refusal::Control));
     assert_eq!(check("command", 1), Err(Refusal::Control));
     assert_eq!(check("control=10", 10), Ok(()));
@@ -197,7 +393,7 @@ fn a_request_for_a_handoff_is_a_request_for_control() {
         check("control=10 except=RequestHandoff", 10),
         Err(Refusal::Excluded)
     );
-    assert!(is_recorded(&handoff(1)));
+    assert!(is_recorded(&handoff(1), &Table::default()));
 }
 
 #[test]
@@ -209,12 +405,18 @@ fn the_first_fragment_decides_on_a_large_message() {
     };
     assert!(
         rules
-            .check(&fragment(DataControl::First, b"\x05\x04\0"))
+            .check(
+                &fragment(DataControl::First, b"\x05\x04\0"),
+                &Table::default()
+            )
             .is_err()
     );
     assert!(
         rules
-            .check(&fragment(DataControl::Middle, b"\x05\x04\0"))
+            .check(
+                &fragment(DataControl::Middle, b"\x05\x04\0"),
+                &Table::default()
+            )
             .is_ok()
     );
 }
@@ -237,7 +439,10 @@ fn with_limits_the_ids_also_where_both_sides_have_wildcards() {
         destination: JausId::new(103, 1, 1),
         ..frame(&b"\x00\x2B\x02"[..])
     };
-    assert_eq!(rules.check(&elsewhere), Err(Refusal::Elsewhere));
+    assert_eq!(
+        rules.check(&elsewhere, &Table::default()),
+        Err(Refusal::Elsewhere)
+    );
 }
 
 #[test]
@@ -248,11 +453,25 @@ fn a_command_to_several_ids_needs_all_of_them_and_a_query_one() {
         ..frame(payload)
     };
     let wrench = b"\x05\x04\0";
-    assert_eq!(rules.check(&to("101.1.40", wrench)), Ok(()));
-    assert_eq!(rules.check(&to("102.255.255", wrench)), Ok(()));
+    assert_eq!(
+        rules.check(&to("101.1.40", wrench), &Table::default()),
+        Ok(())
+    );
+    assert_eq!(
+        rules.check(&to("102.255.255", wrench), &Table::default()),
+        Ok(())
+    );
     for id in ["101.255.255", "65535.255.255", "101.1.255"] {
-        assert_eq!(rules.check(&to(id, wrench)), Err(Refusal::TooWide), "{id}");
-        assert_eq!(rules.check(&to(id, b"\x00\x2B\x02")), Ok(()), "{id}");
+        assert_eq!(
+            rules.check(&to(id, wrench), &Table::default()),
+            Err(Refusal::TooWide),
+            "{id}"
+        );
+        assert_eq!(
+            rules.check(&to(id, b"\x00\x2B\x02"), &Table::default()),
+            Ok(()),
+            "{id}"
+        );
     }
 }
 
@@ -267,15 +486,29 @@ fn a_carried_message_cannot_hide_behind_the_first_fragment() {
         ..frame(&b"\xF6\x01\x01\x0A\0\0\0\x04\0\0\0\x05\x04\0\0"[..octets])
     };
     assert_eq!(
-        rules.check(&event(DataControl::First, 11)),
+        rules.check(&event(DataControl::First, 11), &Table::default()),
         Err(Refusal::Hidden)
     );
     assert_eq!(
-        rules.check(&event(DataControl::First, 12)),
+        rules.check(&event(DataControl::First, 12), &Table::default()),
         Err(Refusal::Hidden)
     );
-    assert_eq!(rules.check(&event(DataControl::First, 13)), Ok(()));
-    assert_eq!(rules.check(&event(DataControl::Single, 15)), Ok(()));
+    assert_eq!(
+        rules.check(&event(DataControl::First, 14), &Table::default()),
+        Err(Refusal::Hidden)
+    );
+    assert_eq!(
+        rules.check(&event(DataControl::First, 15), &Table::default()),
+        Ok(())
+    );
+    assert_eq!(
+        rules.check(&event(DataControl::Single, 15), &Table::default()),
+        Ok(())
+    );
+    assert_eq!(
+        rules.check(&event(DataControl::Single, 14), &Table::default()),
+        Err(Refusal::Hidden)
+    );
 }
 
 #[test]
@@ -286,21 +519,31 @@ fn fragments_that_repeat_the_code_are_checked_each() {
         flags: Flags::default().with_data(DataControl::Last),
         ..frame(&b"\x05\x04\0"[..])
     };
-    assert_eq!(rules.check(&later(Version::As5669a)), Ok(()));
-    assert_eq!(rules.check(&later(Version::As5669)), Err(Refusal::Command));
+    assert_eq!(
+        rules.check(&later(Version::As5669a), &Table::default()),
+        Ok(())
+    );
+    assert_eq!(
+        rules.check(&later(Version::As5669), &Table::default()),
+        Err(Refusal::Command)
+    );
 }
 
 #[test]
 fn an_answer_with_the_code_of_a_command_needs_no_right() {
     for code in [0x000Fu16, 0x0010, 0x01F3, 0x01F4, 0x041C, 0x041D] {
         let frame = frame(code.to_le_bytes().to_vec());
-        assert_eq!(Rules::default().check(&frame), Ok(()), "{code:04X}");
+        assert_eq!(
+            Rules::default().check(&frame, &Table::default()),
+            Ok(()),
+            "{code:04X}"
+        );
     }
     // Execute List and its like are commands, whatever their definitions say.
     for code in [0x061Eu16, 0x080B, 0x080C] {
         let frame = frame(code.to_le_bytes().to_vec());
         assert_eq!(
-            Rules::default().check(&frame),
+            Rules::default().check(&frame, &Table::default()),
             Err(Refusal::Command),
             "{code:04X}"
         );
@@ -310,7 +553,7 @@ fn an_answer_with_the_code_of_a_command_needs_no_right() {
 #[test]
 fn rules_are_written_as_they_are_read() {
     let text = "command clear-emergency configure control=127 with=101.255.255 \
-                only=PrimitiveDriver,D103h except=Time";
+                only=PrimitiveDriver,D103h except=Time also=D103h";
     let rules: Rules = text.parse().unwrap();
     assert_eq!(rules.to_string(), text);
     assert_eq!(rules.to_string().parse::<Rules>().unwrap(), rules);

@@ -15,6 +15,7 @@ use jaus::link::local::record::Reason;
 use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
 use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Sender};
+use jaus::rights::Grant;
 
 use super::failure::Failure;
 use super::identity::OwnId;
@@ -79,6 +80,13 @@ pub struct Network {
     #[arg(long, value_name = "IDS@NETWORK")]
     bind: Vec<Binding>,
 
+    /// What these ids may do that come by plain links: "60 control=127" or "65535.255.255 observe"; the
+    /// first that matches counts, and others are refused (repeatable)
+    ///
+    /// Ids are not proven on plain links. `jaus keys trust --help` has the words.
+    #[arg(long, value_name = "IDS RULES")]
+    grant: Vec<Grant>,
+
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]
     #[arg(
@@ -89,6 +97,7 @@ pub struct Network {
         default_missing_value = "default",
         conflicts_with_all = [
             "interface", "loopback", "port", "group", "ttl", "peer", "allow", "deny", "bind",
+            "grant",
         ],
     )]
     attach: Option<Address>,
@@ -366,6 +375,7 @@ impl Network {
             node.access.deny(entry.clone());
         }
         node.access.bind.extend(&self.bind);
+        node.access.grants.extend_from_slice(&self.grant);
         #[cfg(unix)]
         if self.junior.is_some() {
             node.junior.clone_from(&self.junior);

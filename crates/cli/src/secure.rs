@@ -1,6 +1,7 @@
 //! Flags and settings of the secure link: this node's key, the keys that it trusts, and the peers.
 
 mod files;
+mod table;
 
 use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
@@ -12,13 +13,14 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, Ip, interface};
 use jaus::node::{Config, Tcp, units};
+use jaus::rights::Rules;
 use jaus_audit::{AuditLog, Limits};
-use jaus_secure::rules::Rules;
 use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
 use files::Certificates;
 pub use files::KeyFiles;
+pub use table::table_with;
 
 use super::failure::Failure;
 use super::settings;
@@ -135,6 +137,11 @@ pub struct SecureFlags {
     #[arg(long, value_name = "RATE")]
     secure_budget: Option<Budget>,
 
+    /// Decide on messages of one's own, too, by what the JSIDL file or directory states of them
+    /// (repeatable)
+    #[arg(long, value_name = "PATH")]
+    secure_jsidl: Vec<PathBuf>,
+
     #[command(flatten)]
     files: KeyFiles,
 
@@ -171,6 +178,9 @@ struct Table {
     /// The file of the audit log: sessions, refused messages, control, emergencies. Flag:
     /// `--secure-audit`.
     audit: Option<PathBuf>,
+    /// JSIDL files or folders of messages of one's own, which state what their senders need. Flag:
+    /// `--secure-jsidl`.
+    jsidl: Vec<PathBuf>,
 }
 
 /// The interfaces to send beacons on.
@@ -214,6 +224,7 @@ pub struct Secure {
     trust: Vec<Peer>,
     announce: Option<Interfaces>,
     budget: Option<Budget>,
+    jsidl: Vec<PathBuf>,
     files: KeyFiles,
     certificates: Certificates,
 }
@@ -232,6 +243,7 @@ impl SecureFlags {
             trust: self.trust.clone(),
             announce: table.announce.interfaces(&self.secure_announce),
             budget: self.secure_budget.or(table.budget),
+            jsidl: [&table.jsidl[..], &self.secure_jsidl].concat(),
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
@@ -348,7 +360,7 @@ impl Secure {
             _ => SocketAddr::from(([0; 4], 0)),
         };
         let listen = self.listen.map_or_else(any, |Address(address)| address);
-        let mut settings = jaus_secure::Settings::new(listen);
+        let mut settings = jaus_secure::Settings::new(listen).table(table_with(&self.jsidl)?);
         for peer in self.peers() {
             settings = settings.connect(peer);
         }

@@ -5,10 +5,10 @@ use std::path::Path;
 use jaus_files::{Readers, edit};
 
 use crate::key::PublicKey;
-use crate::rules::Rules;
 use crate::trust::{
     CERTIFICATE, Grant, LONGEST, Peer, Trust, TrustError, in_file, line_of, line_of_grant,
 };
+use jaus::rights::Rules;
 
 /// Adds a peer to a trust file, which is created if necessary. A name that has a key already gets
 /// another one only if `also` says so.

@@ -46,7 +46,6 @@ pub mod edit;
 mod follow;
 mod key;
 mod link;
-pub mod rules;
 mod tls;
 pub mod transport;
 mod trust;

@@ -17,6 +17,7 @@ use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link;
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node;
+use jaus::rights::Table;
 use jaus_audit::AuditLog;
 
 use beacons::Beacons;
@@ -47,6 +48,8 @@ pub struct Settings {
     pub announce: Option<Announce>,
     /// The most UDP octets to send per second, on all sessions together; `None` for no limit.
     pub budget: Option<NonZeroU32>,
+    /// What messages need, for the rules of the peers; `None` for the catalogue's.
+    pub table: Option<Table>,
 }
 
 impl Settings {
@@ -58,6 +61,7 @@ impl Settings {
             connect: Vec::new(),
             announce: None,
             budget: None,
+            table: None,
         }
     }
 
@@ -72,6 +76,13 @@ impl Settings {
     #[must_use]
     pub fn announce(mut self, announce: Announce) -> Self {
         self.announce = Some(announce);
+        self
+    }
+
+    /// Decides by this table what messages need.
+    #[must_use]
+    pub fn table(mut self, table: Table) -> Self {
+        self.table = Some(table);
         self
     }
 
@@ -142,6 +153,9 @@ impl SecureLink {
         let mut transport = Transport::with_credentials(credentials.clone(), settings.connect);
         if let Some(budget) = settings.budget {
             transport = transport.with_budget(budget);
+        }
+        if let Some(table) = settings.table {
+            transport = transport.with_table(table);
         }
         Ok(Self {
             socket,

@@ -25,7 +25,7 @@ use jaus_files::Readers;
 use crate::certificate::Certificate;
 use crate::follow::{Followed, REFUSING};
 use crate::key::{KeyError, PublicKey};
-use crate::rules::{RuleError, Rules};
+use jaus::rights::{RuleError, Rules};
 
 /// What stands in place of the key in a line for a certificate.
 pub(crate) const CERTIFICATE: &str = "certificate";

@@ -13,10 +13,9 @@ use jaus::codec::Message as _;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link::custom::Arrival;
 use jaus::messages::core::{QueryIdentification, RequestControl};
+use jaus::rights::{Acceptance, Refusal, Table, Unaccepted, denial_of_control};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
-use jaus_secure::rules::{Refusal, denial_of_control};
 
-use crate::accept::{Acceptance, Unaccepted};
 use crate::counters::{Counter, Counters};
 use crate::key::{BridgeId, Key, Label, Prefix, Recipient};
 use crate::queue::{Command, Publication, Queue};
@@ -209,7 +208,7 @@ impl Exchange {
         {
             return Err(Counter::InboxFull);
         }
-        match self.accept.check(&frame) {
+        match self.accept.check(&frame, &Table::default()) {
             Ok(()) => {}
             Err(Unaccepted::Source) => return Err(Counter::NotAccepted),
             Err(Unaccepted::Rule(refusal)) => {
@@ -546,6 +545,7 @@ fn reason(refusal: Refusal) -> String {
         Refusal::Authority { asked, most } => {
             format!("authority {asked}, but its --accept allows at most {most}")
         }
+        Refusal::Unknown => remedy("`also=` and its code"),
         _ => "another rule of its --accept forbids it".to_owned(),
     }
 }

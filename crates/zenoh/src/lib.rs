@@ -13,7 +13,6 @@
 //! `docs/zenoh.md` is the guide to the program.
 #![forbid(unsafe_code)]
 
-mod accept;
 mod bridge;
 mod counters;
 mod exchange;
@@ -25,7 +24,6 @@ mod remotes;
 mod thin;
 mod view;
 
-pub use accept::{Acceptance, Grant, GrantError};
 pub use bridge::Bridge;
 pub use counters::{Counter, Counters};
 pub use exchange::{Exchange, Settings};

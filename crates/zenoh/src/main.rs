@@ -7,10 +7,11 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::Config;
+use jaus::rights::{Acceptance, Grant};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_vehicle::parts::Part;
 use jaus_zenoh::key::Prefix;
-use jaus_zenoh::{Acceptance, Bridge, Grant, MinPeriod, NetworkSettings, Settings};
+use jaus_zenoh::{Bridge, MinPeriod, NetworkSettings, Settings};
 
 #[derive(Args)]
 struct Flags {

@@ -168,6 +168,41 @@ fn who_is_denied_is_not_heard() {
     assert_eq!(rig.received().len(), 1);
 }
 
+/// Of a plain link; secure links have rules for each key.
+#[test]
+fn who_has_no_right_to_a_message_is_refused_and_counted() {
+    let grant = |text: &str| text.parse().unwrap();
+    let access = Access {
+        grants: vec![grant("42 control=99"), grant("43 observe")],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    let request = |authority: u8| Bytes::from(vec![0x0D, 0x00, authority]);
+    let query = Bytes::from_static(QUERY_HEARTBEAT);
+    for (number, (source, payload, is_heard)) in [
+        ("42.1.1", request(99), true),
+        ("42.1.1", request(100), false),
+        ("43.1.1", query.clone(), true),
+        ("43.1.1", request(1), false),
+        ("44.1.1", query, false),
+        // No definition has it.
+        ("42.1.1", Bytes::from_static(b"\xBC\xDA"), false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        rig.hear(&Frame {
+            sequence: number as u16,
+            ..Frame::new(id(source), US, payload)
+        });
+        assert_eq!(!rig.received().is_empty(), is_heard, "{number}");
+    }
+    assert_eq!(rig.count(Counter::NotGranted), 4);
+}
+
 #[test]
 fn a_bound_id_is_refused_from_other_networks_and_counted() {
     let access = Access {

@@ -10,16 +10,13 @@ use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Shutdown, Standby,
     report_status,
 };
+use crate::rights::clears_all;
 use crate::service::order::{Mark, mark_of};
-use crate::service::{Handled, Outbox, State, read};
+use crate::service::{Handled, Outbox, State};
 
 /// Limit of remembered clients with an emergency. The next one replaces one that shows no life. If
 /// there is none, it is only noted, and the client in control clears it.
 pub(super) const MOST_EMERGENCIES: usize = 1024;
-
-/// The code of Clear Emergency (0007h) by which a client clears the emergencies of all clients. The
-/// standard reserves it.
-pub const CLEAR_ALL: u16 = 0xFFFF;
 
 impl Condition {
     const fn leads_from(self, state: State) -> State {
@@ -50,7 +47,7 @@ impl Control {
             Shutdown::CODE => self.shut_down(client, out),
             // The emergency code does not matter: stopping is always right.
             SetEmergency::CODE => self.set_emergency((client, mark_of(now, message)), is_alive),
-            ClearEmergency::CODE if clears_all(message) => self.clear_all(client, out),
+            ClearEmergency::CODE if may_clear_all(message) => self.clear_all(client, out),
             ClearEmergency::CODE => {
                 self.clear_emergency((client, mark_of(now, message)), is_alive, out);
             }
@@ -234,11 +231,10 @@ impl Control {
 
 /// Whether a Clear Emergency is for those of all clients, and from one who may clear them: a
 /// component of this node, or a session of a link that has checked the sender's right.
-fn clears_all(message: &Received) -> bool {
+fn may_clear_all(message: &Received) -> bool {
     let is_checked = match message.path {
         None => true,
         Some(path) => matches!(path.peer, Remote::Session(_)),
     };
-    let asked = read::<ClearEmergency>(message).map(|it| it.emergency_code.0);
-    is_checked && asked == Some(CLEAR_ALL)
+    is_checked && clears_all(&message.payload)
 }

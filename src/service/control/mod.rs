@@ -39,7 +39,7 @@
 mod access;
 mod management;
 
-pub use management::CLEAR_ALL;
+pub use crate::rights::CLEAR_ALL;
 
 #[cfg(test)]
 mod tests;

@@ -14,9 +14,9 @@ use jaus::messages::mobility::{
 use jaus::node::{Config, Node};
 
 use super::*;
-use crate::rules::Rules;
 use crate::transport::Act;
 use crate::trust::{Peer, Trust};
+use jaus::rights::Rules;
 
 /// Longer than any step takes.
 const LIMIT: Duration = Duration::from_secs(20);

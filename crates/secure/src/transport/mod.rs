@@ -34,6 +34,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use jaus::endpoint::{Buckets, Rate, SessionId, quota_address};
 use jaus::link::custom::Arrival;
+use jaus::rights::Table;
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, Incoming,
     StreamEvent, VarInt,
@@ -80,6 +81,8 @@ mod code {
 pub struct Transport {
     own: PublicKey,
     credentials: Credentials,
+    /// What messages need, for the rules of the peers.
+    table: Table,
     /// The edition of the trust with which the sessions were last compared.
     edition: u64,
     /// Why new sessions are refused, as last reported.
@@ -127,6 +130,7 @@ impl Transport {
         let config = Arc::new(parameters::of_endpoint(&credentials.own_key()));
         Self {
             own,
+            table: Table::default(),
             edition: credentials.trust_edition(),
             fault: None,
             own_edition,
@@ -149,6 +153,12 @@ impl Transport {
             turns: 0,
             buffer: Vec::new(),
         }
+    }
+
+    /// Decides by this table what messages need; without it by the catalogue's.
+    #[must_use]
+    pub fn with_table(self, table: Table) -> Self {
+        Self { table, ..self }
     }
 
     /// Its counters so far.

@@ -7,7 +7,7 @@ use quinn_proto::ConnectionError;
 
 use crate::authority::Rejection;
 use crate::key::PublicKey;
-use crate::rules::Refusal;
+use jaus::rights::Refusal;
 
 /// Something worth an entry in an audit log.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -29,7 +29,7 @@ jaus::counters! {
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.
     ForeignIds = "dropped: id that the key of its sender may not use",
-    /// Messages refused by the [rules](crate::rules::Rules) of the key of their sender.
+    /// Messages refused by the [rules](jaus::rights::Rules) of the key of their sender.
     RuleForbids = "dropped: forbidden by the rules of its sender",
     Malformed = "dropped: not JUDP",
     /// Messages not sent to a peer because the rules separate it from their source.

@@ -2,12 +2,9 @@
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::codec::Message as _;
-use jaus::messages;
-use jaus::messages::core::{ClearEmergency, ConfirmControl, confirm_control::ResponseCode};
+use jaus::rights::{Refusal, Table};
 use jaus::wire::{Frame, judp};
 
-use crate::rules::{Refusal, clears_all};
 use crate::trust::Peer;
 
 /// Why a frame does not pass.
@@ -28,12 +25,12 @@ pub(super) struct Screened {
 }
 
 /// Screens a datagram from a peer; `None` if it is no JUDP.
-pub(super) fn incoming(peer: &Peer, octets: &Bytes) -> Option<Screened> {
+pub(super) fn incoming(peer: &Peer, table: &Table, octets: &Bytes) -> Option<Screened> {
     screen(octets, |frame| {
         if !peer.speaks_for(frame.source) {
             return Err(Stop::ForeignId);
         }
-        peer.rules.check(frame).map_err(Stop::Rule)
+        peer.rules.check(frame, table).map_err(Stop::Rule)
     })
 }
 
@@ -70,34 +67,14 @@ pub(super) fn screen(
     Some(Screened { passed, frames })
 }
 
-/// What Confirm Control says, if the frame is one.
-pub(super) fn confirmed_control(frame: &Frame) -> Option<ResponseCode> {
-    let is_answer = frame.code() == Some(ConfirmControl::CODE);
-    let decoded = is_answer.then(|| ConfirmControl::decode(&frame.payload).ok());
-    decoded.flatten().map(|it| it.response_code)
-}
-
-/// The name of a message, or its code, for people.
-pub(super) fn name_of(frame: &Frame) -> String {
-    let Some(code) = frame.code() else {
-        return "a message".to_owned();
-    };
-    let known = messages::registry().by_code(code).next();
-    let name = known.map_or_else(|| format!("{code:04X}h"), |message| message.name.to_owned());
-    match code == ClearEmergency::CODE && clears_all(&frame.payload) {
-        true => format!("{name} of all clients"),
-        false => name,
-    }
-}
-
 /// One frame of a message that was refused, in words for the peer and the log.
-pub(super) fn sentence(frame: &Frame, refusal: Refusal) -> String {
+pub(super) fn sentence(frame: &Frame, table: &Table, refusal: Refusal) -> String {
     let Frame {
         source,
         destination,
         ..
     } = frame;
-    let name = name_of(frame);
+    let name = table.name_of(&frame.payload);
     format!("{name} from {source} to {destination}: {refusal}")
 }
 

@@ -74,6 +74,9 @@ pub(super) struct Requests(VecDeque<(JausId, JausId)>);
 impl Requests {
     /// Adds a request; the oldest goes if there are too many.
     pub(super) fn add(&mut self, component: JausId, client: JausId) {
+        if self.0.contains(&(component, client)) {
+            return;
+        }
         if self.0.len() == MOST_REQUESTS {
             self.0.pop_front();
         }
@@ -84,11 +87,15 @@ impl Requests {
         self.0.is_empty()
     }
 
-    /// Takes the request that a component answers; returns whether there was one.
-    pub(super) fn take(&mut self, component: JausId, client: JausId) -> bool {
+    /// Whether there is a request that a component answers. It stays until it is granted: a handover may
+    /// be put off first.
+    pub(super) fn answer(&mut self, component: JausId, client: JausId, is_granted: bool) -> bool {
         let answers = |it: &(JausId, JausId)| it.1 == client && it.0.overlaps(component);
         let found = self.0.iter().position(answers);
-        found.and_then(|index| self.0.remove(index)).is_some()
+        if let Some(index) = found.filter(|_| is_granted) {
+            self.0.remove(index);
+        }
+        found.is_some()
     }
 }
 

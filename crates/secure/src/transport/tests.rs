@@ -14,8 +14,8 @@ use jaus::wire::{DataControl, Flags, Frame, Priority, judp};
 
 use super::parameters::{IDLE, KEEP_ALIVE};
 use super::*;
-use crate::rules::Rules;
 use crate::trust::{Peer, Trust};
+use jaus::rights::Rules;
 
 mod certificates;
 

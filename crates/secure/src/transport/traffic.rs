@@ -6,7 +6,8 @@ use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::codec::Message as _;
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::messages::core::{RequestControl, confirm_control::ResponseCode};
+use jaus::messages::core::RequestControl;
+use jaus::rights::{Permission, denial_of_control, is_recorded};
 use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
@@ -14,7 +15,6 @@ use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
 use super::{Counter, Transport};
-use crate::rules::{denial_of_control, is_recorded};
 use crate::trust::Peer;
 
 /// The first octet of a notice: text for the peer, about a message of its that was refused. No
@@ -88,14 +88,14 @@ impl Transport {
         };
         for frame in frames.map_while(Result::ok) {
             let (component, client) = (frame.source, frame.destination);
-            let has_asked = |it: &mut Session| it.requests.take(component, client);
-            if let Some(answer) = screen::confirmed_control(&frame)
-                && self.sessions.get_mut(&id).is_some_and(has_asked)
+            if let Some(Permission::Answer { is_granted }) = self.table.permission(&frame.payload)
+                && let Some(session) = self.sessions.get_mut(&id)
+                && session.requests.answer(component, client, is_granted)
             {
                 let act = Act::Control {
                     component,
                     client,
-                    is_granted: answer == ResponseCode::CONTROL_ACCEPTED,
+                    is_granted,
                 };
                 self.record(id, act);
             }
@@ -145,7 +145,7 @@ impl Transport {
             self.counters.add(Counter::NoticesReceived);
             return;
         }
-        let Some(screened) = screen::incoming(peer, octets) else {
+        let Some(screened) = screen::incoming(peer, &self.table, octets) else {
             self.counters.add(Counter::Malformed);
             return;
         };
@@ -168,16 +168,16 @@ impl Transport {
         decision: Result<(), Stop>,
     ) {
         let (source, destination) = (frame.source, frame.destination);
-        let code = frame.code().unwrap_or_default();
+        let table = self.table.clone();
         let message = |refusal| Act::Message {
-            name: screen::name_of(frame),
+            name: table.name_of(&frame.payload),
             source,
             destination,
             refusal,
         };
         match decision {
-            Ok(()) if is_recorded(frame) => {
-                if code == RequestControl::CODE
+            Ok(()) if is_recorded(frame, &table) => {
+                if let Some(Permission::Control { .. }) = table.permission(&frame.payload)
                     && let Some(session) = self.sessions.get_mut(&id)
                 {
                     session.requests.add(destination, source);
@@ -198,7 +198,7 @@ impl Transport {
             Err(Stop::Rule(refusal)) => {
                 self.counters.add(Counter::RuleForbids);
                 self.record(id, message(Some(refusal)));
-                self.answer_refusal(now, id, frame, &screen::sentence(frame, refusal));
+                self.answer_refusal(now, id, frame, &screen::sentence(frame, &table, refusal));
             }
         }
     }

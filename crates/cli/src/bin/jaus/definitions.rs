@@ -64,6 +64,11 @@ impl Definitions {
 }
 
 impl Jsidl {
+    /// The files and directories.
+    pub(crate) fn paths(&self) -> &[PathBuf] {
+        &self.jsidl
+    }
+
     /// Whether any definitions are given.
     pub(crate) const fn is_given(&self) -> bool {
         !self.jsidl.is_empty()

@@ -1,6 +1,7 @@
 //! `jaus keys`: the key of this host's node, the keys that it trusts, and the team's certificates.
 
 mod ca;
+mod explain;
 mod rotate;
 
 use std::fs;
@@ -9,11 +10,11 @@ use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 use jaus::address::JausId;
+use jaus::rights::Rules;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::folders::make_folder_of;
 use jaus_cli::output::{Output, say};
 use jaus_cli::secure::KeyFiles;
-use jaus_secure::rules::Rules;
 use jaus_secure::{Grant, Key, Peer, PublicKey, Trust, edit};
 use serde_json::json;
 
@@ -53,6 +54,8 @@ enum Action {
     Revoke(Revoke),
     /// List the trusted keys, the ids that they may speak for, and their rules
     List(List),
+    /// Show which messages a peer may send, and why not the others
+    Explain(explain::Explain),
     /// Issue and revoke certificates, instead of trusting each key on each host
     Ca(ca::Ca),
 }
@@ -121,7 +124,8 @@ struct Allow {
 #[derive(Args)]
 struct RuleWords {
     /// What it may do besides observing: command, control=AUTHORITY, clear-emergency, configure; and
-    /// its limits: with=IDS, only=NAMES, except=NAMES (services, messages or codes)
+    /// its limits: with=IDS, only=NAMES, except=NAMES (services, messages or codes); also=CODES for messages that no
+    /// definition has
     #[arg(value_name = "RULE")]
     rules: Vec<String>,
 }
@@ -178,6 +182,7 @@ impl Keys {
             Action::Revoke(it) => it.remove(),
             Action::List(it) => it.list(),
             Action::Rotate(it) => it.run(),
+            Action::Explain(it) => it.run(),
             Action::Ca(it) => it.run(),
         }
     }

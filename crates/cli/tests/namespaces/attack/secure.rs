@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use jaus::node::{Config, Node};
-use jaus_secure::rules::Rules;
+use jaus::rights::Rules;
 use jaus_secure::transport::Transport;
 use jaus_secure::{Key, Peer, SecureLink, Settings, TrustFile, edit};
 use jaus_test_kit::hosts::SETTINGS;

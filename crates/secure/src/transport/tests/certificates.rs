@@ -129,7 +129,7 @@ fn nodes_with_certificates_of_one_authority_need_no_trust_file() {
 fn a_line_of_the_trust_file_narrows_the_ids_of_a_certificate() {
     let team = Team::new();
     team.issue("rover", "101.255.255", 30, NOW);
-    let trust = Trust::parse("operator certificate 60.1.255,61.255.255 command").unwrap();
+    let trust = Trust::parse("operator certificate 60.1.255,61.255.255 command also=any").unwrap();
     let trust = TrustFile::of(trust);
     let rover = team.load("rover", &trust, NOW).unwrap();
     let mut network = connected(&[rover, team.node("operator", "60.255.255")]);

@@ -260,3 +260,46 @@ fn refused_messages_do_not_displace_the_record_of_what_was_done() {
     let is_stop = |act: &Act| matches!(act, Act::Message { name, refusal: None, .. } if name == "SetEmergency");
     assert!(records(&mut network, 0).iter().any(is_stop));
 }
+
+/// Handover of Enhanced Access Control: the request may be put off before it is granted.
+#[test]
+fn a_handover_is_recorded_with_each_of_its_answers() {
+    let (mut network, ..) = vehicle_with_rules("control=127");
+    let raw = |source: &str, destination: &str, payload: &'static [u8]| {
+        let (source, destination) = (source.parse().unwrap(), destination.parse().unwrap());
+        judp::encode(&Frame::new(
+            source,
+            destination,
+            Bytes::from_static(payload),
+        ))
+        .unwrap()
+    };
+    // Authority 100, and 200; no explanation.
+    for request in [b"\x31\xFF\x64\0", b"\x31\xFF\xC8\0"] {
+        network.send(1, Priority::Standard, &raw("60.1.1", "101.1.1", request));
+    }
+    network.run(SECOND);
+    // Request 1 is queued, then granted.
+    for answer in [b"\x35\xFF\x01\x04", b"\x35\xFF\x01\0", b"\x35\xFF\x01\0"] {
+        network.send(0, Priority::Standard, &raw("101.1.1", "60.1.1", answer));
+    }
+    network.run(SECOND);
+    let seen = records(&mut network, 0)
+        .into_iter()
+        .filter_map(|act| match act {
+            Act::Message { name, refusal, .. } => Some((name, refusal.is_none())),
+            Act::Control { is_granted, .. } => Some(("answer".to_owned(), is_granted)),
+            _ => None,
+        });
+    let seen: Vec<_> = seen.collect();
+    let expected = [
+        ("RequestHandoff", true),
+        ("RequestHandoff", false),
+        ("answer", false),
+        ("answer", true),
+    ];
+    assert_eq!(
+        seen,
+        expected.map(|(name, is_allowed)| (name.to_owned(), is_allowed))
+    );
+}

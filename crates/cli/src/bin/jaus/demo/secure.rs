@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use jaus::address::JausId;
 use jaus::node::{Config, Node};
+use jaus::rights::Rules;
 use jaus_cli::failure::Failure;
-use jaus_secure::rules::Rules;
 use jaus_secure::{Key, Peer, PublicKey, SecureLink, Settings, TrustFile, edit};
 
 use super::network::{OPERATOR, VEHICLE};

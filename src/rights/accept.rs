@@ -1,13 +1,14 @@
-//! Which ids may come from the zenoh side, and what each may do.
+//! Which ids may come from a side that proves no identity, and what each may do.
 
 use std::fmt;
 use std::str::FromStr;
 
-use jaus::address::JausId;
-use jaus::wire::Frame;
-use jaus_secure::rules::{Refusal, RuleError, Rules};
+use super::{Refusal, RuleError, Rules, Table};
+use crate::address::JausId;
+use crate::as_text::serde_as_text;
+use crate::wire::Frame;
 
-/// Ids of the other side, and their rights.
+/// Ids, and their rights, as text `60 control=127`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grant {
     /// The ids, with wildcards.
@@ -48,7 +49,7 @@ impl FromStr for Grant {
 }
 
 /// Reads an id with wildcards, or the number of a subsystem for all of its components.
-pub(crate) fn one_or_more(text: &str) -> Option<JausId> {
+pub fn one_or_more(text: &str) -> Option<JausId> {
     let subsystem = text.parse().ok();
     let all_of = |subsystem| JausId::new(subsystem, JausId::ANY_NODE, JausId::ANY_COMPONENT);
     let ids = subsystem.map_or_else(|| text.parse().ok(), |it| Some(all_of(it)))?;
@@ -61,12 +62,12 @@ impl fmt::Display for Grant {
     }
 }
 
-/// The ids that may come from the zenoh side.
+/// The ids that are accepted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Acceptance(Vec<Grant>);
 
 /// The most grants.
-pub(crate) const MOST_GRANTS: usize = 256;
+pub const MOST_GRANTS: usize = 256;
 
 impl Default for Acceptance {
     /// All ids, which may observe, but set no emergency: nobody has named them.
@@ -79,11 +80,13 @@ impl Default for Acceptance {
 }
 
 /// Why a message is not accepted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Unaccepted {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unaccepted {
     /// Its source is in no grant.
+    #[error("its source is not accepted")]
     Source,
     /// The rights of its source forbid it.
+    #[error(transparent)]
     Rule(Refusal),
 }
 
@@ -95,20 +98,18 @@ impl Acceptance {
         Self(grants.into_iter().take(MOST_GRANTS).collect())
     }
 
-    fn grant(&self, id: JausId) -> Option<&Grant> {
-        self.0.iter().find(|grant| grant.ids.matches(id))
-    }
-
     /// Whether messages of this component are accepted at all.
     #[must_use]
     pub fn accepts(&self, id: JausId) -> bool {
-        self.grant(id).is_some()
+        grant_of(&self.0, id).is_some()
     }
 
-    /// Checks a message from the other side.
-    pub(crate) fn check(&self, frame: &Frame) -> Result<(), Unaccepted> {
-        let grant = self.grant(frame.source).ok_or(Unaccepted::Source)?;
-        grant.rules.check(frame).map_err(Unaccepted::Rule)
+    /// Checks a message; the table tells what it needs.
+    ///
+    /// # Errors
+    /// Why it is not accepted.
+    pub fn check(&self, frame: &Frame, table: &Table) -> Result<(), Unaccepted> {
+        check(&self.0, frame, table)
     }
 
     /// The ids to subscribe to: none is part of another.
@@ -127,6 +128,19 @@ impl Acceptance {
         needed.map(|(_, id)| id).collect()
     }
 }
+
+/// The first grant that an id matches.
+fn grant_of(grants: &[Grant], id: JausId) -> Option<&Grant> {
+    grants.iter().find(|grant| grant.ids.matches(id))
+}
+
+/// Checks a message by the first of these grants that its source matches.
+pub(crate) fn check(grants: &[Grant], frame: &Frame, table: &Table) -> Result<(), Unaccepted> {
+    let grant = grant_of(grants, frame.source).ok_or(Unaccepted::Source)?;
+    grant.rules.check(frame, table).map_err(Unaccepted::Rule)
+}
+
+serde_as_text!(Grant);
 
 #[cfg(test)]
 mod tests {
@@ -151,9 +165,12 @@ mod tests {
     #[test]
     fn without_grants_everybody_may_observe_and_nobody_may_command_or_set_an_emergency() {
         let all = Acceptance::default();
-        assert_eq!(all.check(&frame(OPERATOR, QUERY)), Ok(()));
+        assert_eq!(
+            all.check(&frame(OPERATOR, QUERY), &Table::default()),
+            Ok(())
+        );
         for command in [RESUME, REQUEST_CONTROL, SET_EMERGENCY] {
-            let refused = all.check(&frame(OPERATOR, command));
+            let refused = all.check(&frame(OPERATOR, command), &Table::default());
             assert!(matches!(refused, Err(Unaccepted::Rule(_))), "{refused:?}");
         }
     }
@@ -161,14 +178,26 @@ mod tests {
     #[test]
     fn a_grant_gives_its_ids_its_rights_and_excludes_all_others() {
         let some = acceptance(&["60.1.1 control=127", "60 observe"]);
-        assert_eq!(some.check(&frame(OPERATOR, REQUEST_CONTROL)), Ok(()));
+        assert_eq!(
+            some.check(&frame(OPERATOR, REQUEST_CONTROL), &Table::default()),
+            Ok(())
+        );
         let colleague = JausId::new(60, 2, 1);
-        assert_eq!(some.check(&frame(colleague, QUERY)), Ok(()));
-        assert_eq!(some.check(&frame(colleague, SET_EMERGENCY)), Ok(()));
-        let refused = some.check(&frame(colleague, REQUEST_CONTROL));
+        assert_eq!(
+            some.check(&frame(colleague, QUERY), &Table::default()),
+            Ok(())
+        );
+        assert_eq!(
+            some.check(&frame(colleague, SET_EMERGENCY), &Table::default()),
+            Ok(())
+        );
+        let refused = some.check(&frame(colleague, REQUEST_CONTROL), &Table::default());
         assert_eq!(refused, Err(Unaccepted::Rule(Refusal::Control)));
         let stranger = JausId::new(61, 1, 1);
-        assert_eq!(some.check(&frame(stranger, QUERY)), Err(Unaccepted::Source));
+        assert_eq!(
+            some.check(&frame(stranger, QUERY), &Table::default()),
+            Err(Unaccepted::Source)
+        );
     }
 
     #[test]
