@@ -5,7 +5,7 @@
 
 import { get, mark, number, say, show, toast } from "./dom.js";
 import { StopLink } from "./stop_link.js";
-import { othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
+import { haveStopped, othersWords, pendingStops, stopAllWords, stopCondition, stopWords } from "./stopping.js";
 
 const CLEAR_TEXT = "The vehicle can move again once a client resumes and commands it. Check it first.";
 const touch = matchMedia("(hover: none)");
@@ -25,6 +25,8 @@ export class Emergency {
   /** Whether the station has stopped the vehicle, which may not have reported it yet, and perhaps never can. */
   #isSet = false;
   #vehicles = [];
+  /** The vehicles that were there when all were stopped. A station that has restarted since may not know them yet. */
+  #toStop = [];
   /** Whether the station stops vehicles that join. */
   #latched = false;
   /** Why the station takes no requests from this page; empty if it does. */
@@ -70,6 +72,8 @@ export class Emergency {
 
   /** Stops all vehicles. */
   stopAll() {
+    const there = this.#vehicles.filter(({ presence }) => !["gone", "unknown"].includes(presence));
+    this.#toStop = there.map(({ subsystem }) => subsystem);
     this.#press(() => this.#stops.stopAll());
   }
 
@@ -97,7 +101,8 @@ export class Emergency {
   /** Takes a list of vehicles that has just arrived, and whether all are to be stopped. */
   handleFleet({ vehicles, allStopped, stops }) {
     for (const vehicle of vehicles) this.#confirm(vehicle, stops);
-    if (allStopped && pendingStops(vehicles) === 0) this.#stops.confirm("all", stops);
+    const isDone = allStopped && pendingStops(vehicles) === 0;
+    if (isDone && haveStopped(this.#toStop, vehicles)) this.#stops.confirm("all", stops);
   }
 
   /** Takes what the station says of a vehicle when it has taken so many stops. */

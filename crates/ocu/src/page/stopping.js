@@ -57,6 +57,13 @@ function sorted(vehicles) {
 /** How many vehicles have not reported their emergency, or report nothing and are not even stopped by the station. */
 export const pendingStops = (vehicles) => sorted(vehicles).pending;
 
+/** Whether these vehicles, by their subsystems, have reported their emergency or have left. */
+export function haveStopped(subsystems, vehicles) {
+  const has = ({ presence, emergency }) => emergency === true || presence === "gone";
+  const stopped = vehicles.filter(has).map(({ subsystem }) => subsystem);
+  return subsystems.every((subsystem) => stopped.includes(subsystem));
+}
+
 /** What *Stop all* has reached, in words. `wanted` says whether it is still being sent. */
 export function stopAllWords(vehicles, wanted) {
   const { present, pending, runaways, moving, unknown, mute } = sorted(vehicles);

@@ -165,10 +165,15 @@ impl World {
     /// The hand of a page takes something up for a time.
     pub(crate) fn hold(&mut self, page: usize, device: Device, time: Duration, gets_lost: bool) {
         let (page, now) = (&mut self.pages[page], self.now);
-        page.hold(now, device, time, gets_lost, &mut self.random);
         let (number, vehicle, way) = (page.number, page.view.vehicle, page.way);
         let is_ready = page.view.line.starts_with("Ready");
-        if let Some(vehicle) = VEHICLES.iter().position(|it| *it == vehicle) {
+        let meant = VEHICLES.iter().position(|it| *it == vehicle);
+        if meant.is_none() && device == Device::Gamepad {
+            // It is pressed a moment later, when the page may show a vehicle.
+            return;
+        }
+        page.hold(now, device, time, gets_lost, &mut self.random);
+        if let Some(vehicle) = meant {
             self.witness.hold(now, (number, vehicle, way), is_ready);
         }
         let lost = if gets_lost { ", then is lost" } else { "" };

@@ -56,7 +56,7 @@ function page({ vehicle = 101, barred = "" } = {}) {
   const state = (changes, stops) => ({ vehicle: { subsystem: 101, emergency: false, stop_set: false, ...changes }, stops });
   const lastPress = () => Socket.all.flatMap(({ sent }) => sent).at(-1).split(" ").at(-1);
   const say = (data) => Socket.all[0].dispatchEvent(Object.assign(new Event("message"), { data }));
-  const update = (shown) => emergency.update(shown, true, { vehicles: [], allStopped: false }, barred, clears);
+  const update = (shown) => emergency.update(shown, true, fleet, barred, clears);
   update(null);
   return {
     link,
@@ -78,6 +78,7 @@ function page({ vehicle = 101, barred = "" } = {}) {
     hearFleet: (vehicles, stops, all_stopped = false) => {
       fleet.handle({ vehicles, all_stopped, stops });
       emergency.handleFleet(fleet);
+      update(null);
     },
     answer: async (reason) => {
       answer(reason);
@@ -220,6 +221,27 @@ test("a stop of all is confirmed by the latch and the station's stop of each, an
   hearFleet(known(false), 1, true);
   assert.deepEqual(repeated(), ["stop-all"]);
   hearFleet(known(true), 1, true);
+  assert.deepEqual(repeated(), []);
+});
+
+test("a stop of all is not confirmed by a station that does not know the vehicles yet that were there", () => {
+  const one = (changes) => ({ subsystem: 101, state: "ready", emergency: false, presence: "present", ...changes });
+  const { emergency, hearFleet, take, repeated } = page();
+  hearFleet([one(), one({ subsystem: 102 }), one({ subsystem: 103, presence: "gone" })], 0);
+  emergency.stopAll();
+  take(1);
+  // The station has restarted, and stops whatever comes.
+  hearFleet([], 1, true);
+  assert.deepEqual(repeated(), ["stop-all"]);
+  const stopped = one({ state: "emergency", emergency: true, stop_set: true });
+  hearFleet([stopped], 1, true);
+  assert.deepEqual(repeated(), ["stop-all"]);
+  // Its settings name the other one, or it was heard and is silent now.
+  for (const presence of ["unknown", "silent"]) {
+    hearFleet([stopped, one({ subsystem: 102, state: null, presence, stop_set: true })], 1, true);
+    assert.deepEqual(repeated(), ["stop-all"], presence);
+  }
+  hearFleet([stopped, one({ subsystem: 102, state: null, presence: "gone" })], 1, true);
   assert.deepEqual(repeated(), []);
 });
 
