@@ -14,7 +14,7 @@ use jaus::node::{Config, Node};
 use jaus::service::Timing;
 use jaus_test_kit::figures::Figures;
 use jaus_vehicle::parts::{Part, Slot};
-use jaus_zenoh::{Acceptance, Bridge, NetworkSettings, Settings};
+use jaus_zenoh::{Bridge, NetworkSettings, Settings};
 use tokio::task::JoinSet;
 
 use super::numbered;

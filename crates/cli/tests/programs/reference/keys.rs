@@ -9,13 +9,14 @@ use serde_json::{Value as Json, json};
 use super::source::{Definition, Kind, Shape, Source, Variant};
 
 /// The sources of the settings.
-const FILES: [&str; 18] = [
+const FILES: [&str; 19] = [
     "src/node/config/mod.rs",
     "src/node/config/delivery.rs",
     "src/node/config/tcp.rs",
     "src/node/config/peer.rs",
     "src/node/mailbox.rs",
     "src/endpoint/access.rs",
+    "src/rights/accept.rs",
     "src/endpoint/egress/mod.rs",
     "src/endpoint/forward.rs",
     "src/endpoint/rate.rs",

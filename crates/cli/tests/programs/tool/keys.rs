@@ -1,6 +1,7 @@
 //! `jaus keys`, and commands that reach a vehicle by a secure link alone.
 
 mod certificates;
+mod rights;
 mod rotation;
 
 use std::path::PathBuf;
@@ -349,7 +350,7 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
     ];
     let refused = as_operator(&operator, &address, &drive);
     assert_eq!(refused.status, 1, "{refused:?}");
-    let words = "RequestControl from 60.1.1 to 115.1.4: its key may not take control";
+    let words = "RequestControl from 60.1.1 to 115.1.4: its sender may not take control";
     assert!(refused.stderr.contains(words), "{refused:?}");
 
     let allowed = at_vehicle.keys(&["allow", "operator", "control=100"]);
@@ -364,7 +365,7 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
         let refused = as_operator(&operator, &address, &drive);
         refused
             .stderr
-            .contains("authority 127, but its key may take control with at most 100")
+            .contains("authority 127, but its sender may take control with at most 100")
     });
     let within = drive.map(|it| if it == "127" { "100" } else { it });
     let sent = as_operator(&operator, &address, &within);
@@ -374,7 +375,7 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
     let audit = std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
     for part in [
         r#""who":"operator","what":"connect","result":"allowed""#,
-        r#""who":"operator","what":"RequestControl","to":"115.1.4","result":"refused","why":"its key may not take control"#,
+        r#""who":"operator","what":"RequestControl","to":"115.1.4","result":"refused","why":"its sender may not take control"#,
         r#""who":"operator","what":"control","to":"115.1.4","result":"allowed""#,
         r#""id":"60.1.1""#,
     ] {
