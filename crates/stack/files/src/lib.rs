@@ -8,8 +8,8 @@
 //! | [`read`], [`read_text`], [`Readers`] | what is secret is not readable, and what is trusted not writable by others |
 //! | [`append`], [`options`] | a log or recording is created for its readers; the mode of an existing file stays |
 //! | [`FileStamp`] | a change of a file is noticed, also one of its owner or mode |
-//! | [`Followed`] | a value from files is read again when they have changed; its users see what to do with an unusable file |
-//! | [`FormerContent`] | after a change it is known which services have taken it |
+//! | [`Followed`] | a value from files is read again when they have changed; while they cannot be used it stays, with the reason |
+//! | [`FormerContent`] | who changes a file learns whether the services that use it have taken the change |
 //!
 //! Errors are [`io::Error`](std::io::Error)s whose texts name the remedy. They do not name the file that
 //! was passed, which the caller does.
