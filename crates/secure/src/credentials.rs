@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
+use jaus_files::Followed;
 use rustls::pki_types::{CertificateDer, UnixTime};
 use rustls::sign::CertifiedKey;
 
 use crate::authority::{Authority, Rejection};
 use crate::certificate::{Certificate, CertificateError, shown};
-use crate::follow::{Followed, KEEPING, REFUSING};
+use crate::follow::{KEEPING, REFUSING, follow};
 use crate::key::{Key, PublicKey};
 use crate::trust::{Peer, TrustFile};
 
@@ -163,10 +164,10 @@ impl Credentials {
     /// Reads each file again whenever it has changed, as long as the credentials are in use. Must
     /// be called within a tokio runtime.
     pub fn follow(&self) {
-        self.own.follow(KEEPING);
+        follow(&self.own, KEEPING);
         self.trust.follow();
         if let Some(authority) = &self.authority {
-            authority.follow(REFUSING);
+            follow(authority, REFUSING);
         }
     }
 

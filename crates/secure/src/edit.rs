@@ -47,7 +47,7 @@ fn with_line(text: &str, line: &str) -> String {
 }
 
 /// Replaces the rules of the peer or certificate with this name; returns whether it was there. A
-/// running node applies them within seconds.
+/// running node applies them within two seconds.
 ///
 /// # Errors
 /// If the file cannot be read or written, or has a malformed line.
@@ -91,7 +91,7 @@ fn with_rules(line: &str, rules: &Rules) -> Result<String, TrustError> {
 }
 
 /// Removes the peer with this name from a trust file, or only one `key` of it; returns whether it
-/// was there. A running node closes its session within seconds.
+/// was there. A running node closes its session within two seconds.
 ///
 /// # Errors
 /// If the file cannot be read or written, has a malformed line, or has only limits of a certificate

@@ -20,10 +20,10 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use jaus::address::JausId;
-use jaus_files::Readers;
+use jaus_files::{Followed, Readers};
 
 use crate::certificate::Certificate;
-use crate::follow::{Followed, REFUSING};
+use crate::follow::{REFUSING, follow};
 use crate::key::{KeyError, PublicKey};
 use jaus::rights::{RuleError, Rules};
 
@@ -365,7 +365,7 @@ impl TrustFile {
     /// within a tokio runtime. A file that has become unusable is logged, and has the effect of
     /// [`reload`](Self::reload) with an error.
     pub fn follow(&self) {
-        self.0.follow(REFUSING);
+        follow(&self.0, REFUSING);
     }
 
     /// Why new sessions are refused: the file has become unusable.
@@ -507,6 +507,24 @@ mod tests {
         file.reload().unwrap();
         assert!(file.find(key(1)).is_none());
         assert_eq!(file.fault(), None);
+    }
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_revocation_is_confirmed_when_the_node_that_follows_the_file_has_taken_it() {
+        use jaus_files::{FormerContent, Uptake};
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
+        let file = TrustFile::load(&path).unwrap();
+        file.follow();
+        let former = FormerContent::of(&path);
+        assert!(crate::edit::revoke(&path, "rover", None).unwrap());
+        let waiting = tokio::task::spawn_blocking(move || former.uptake());
+        let uptake = waiting.await.unwrap();
+        assert!(matches!(uptake, Uptake::Complete), "{uptake:?}");
+        assert!(file.find(key(1)).is_none());
     }
 
     #[cfg(unix)]

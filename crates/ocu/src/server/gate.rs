@@ -1,5 +1,6 @@
 //! Who may use the page: holders of the token, users who log in, or everyone on this host.
 
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,7 +14,7 @@ use super::logins::{Ending, Login, LoginId, Logins};
 use super::trail::Trail;
 use super::visitor::Visitor;
 use crate::token::Token;
-use crate::users::{PasswordHash, UserRole, Users, UsersFile};
+use crate::users::{PasswordHash, UserRole, Users, UsersError, UsersFile};
 use jaus::node::now;
 
 /// The user of a page that requires no login.
@@ -71,6 +72,10 @@ pub(super) enum LoginError {
     Busy,
     #[error("the system has no random numbers")]
     NoRandomness,
+    #[error(
+        "nobody can log in until the file of the users can be used again: see the log of this station"
+    )]
+    UnusableUsers,
 }
 
 /// The users of the page and their sessions.
@@ -188,6 +193,14 @@ impl UserGate {
         format!("{}-device", self.cookie)
     }
 
+    /// Checks that users can log in: a file that has become unusable may lack one who was removed.
+    pub(super) fn check_users(&self) -> Result<(), LoginError> {
+        match self.file.fault() {
+            Some(_) => Err(LoginError::UnusableUsers),
+            None => Ok(()),
+        }
+    }
+
     /// Verifies a password, and begins a session. Returns its secret.
     pub(super) async fn log_in(
         &self,
@@ -213,7 +226,13 @@ impl UserGate {
             }
         };
         let verified = spawn_blocking(verify).await.ok().flatten();
-        let user = Arc::new(verified.ok_or(LoginError::Wrong)?);
+        let user = verified.ok_or(LoginError::Wrong)?;
+        // The file may have changed meanwhile.
+        self.check_users()?;
+        if self.users().find(name) != Some(&user) {
+            return Err(LoginError::Wrong);
+        }
+        let user = Arc::new(user);
         let secret = Token::generate().map_err(|_| LoginError::NoRandomness)?;
         let displaced = self.logins().begin(now(), &secret, user, address);
         if let Some(login) = displaced {
@@ -266,12 +285,31 @@ impl UserGate {
         match self.file.refresh() {
             Ok(true) => tracing::info!("the users file has been read again"),
             Ok(false) => {}
-            Err(error) => tracing::error!(%error, "the previous users remain"),
+            Err(error) => self.report_unusable(&error),
+        }
+        if self.file.fault().is_some() {
+            // Whose session ends now could not log in again to stop a vehicle.
+            return;
         }
         let ended = self.logins().expire(now, &self.users());
         for (login, why) in ended {
             self.trail.ended(&login, &why);
         }
+    }
+
+    /// Says that nobody can log in, and who remains: one who was to be removed may be among them.
+    fn report_unusable(&self, error: &UsersError) {
+        let logins = self.logins();
+        let connected: BTreeSet<_> = logins.all().iter().map(|it| &*it.user.name).collect();
+        let connected = match connected.len() {
+            0 => "nobody".to_owned(),
+            _ => connected.into_iter().collect::<Vec<_>>().join(", "),
+        };
+        tracing::error!(
+            connected,
+            "nobody can log in, because {error}; the sessions of the connected users remain, also of one who \
+             was to be removed: make the file usable, or stop the station"
+        );
     }
 }
 
@@ -283,4 +321,65 @@ fn cookie<'h>(headers: &'h HeaderMap, wanted: &str) -> Option<&'h str> {
         .flat_map(|it| it.split(';'))
         .filter_map(|it| it.trim().split_once('='));
     pairs.find_map(|(name, value)| (name == wanted).then_some(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::users::tests::user;
+    use crate::users::{add, remove};
+    use jaus::address::JausId;
+
+    /// A gate with anna, who has logged in, and the id of her session.
+    fn gate(path: &std::path::Path, now: Instant) -> (UserGate, LoginId) {
+        let anna = user("anna", UserRole::Drive);
+        add(path, &anna).unwrap();
+        let file = UsersFile::load(path).unwrap();
+        let trail = Trail::new(None, JausId::new(60, 1, 1));
+        let gate = UserGate::new(file, Devices::load(None), 8443, true, trail);
+        let secret = Token::generate().unwrap();
+        let address = ([10, 0, 0, 1], 999).into();
+        gate.logins().begin(now, &secret, Arc::new(anna), address);
+        let id = gate.logins().all()[0].id;
+        (gate, id)
+    }
+
+    #[test]
+    fn while_nobody_can_log_in_no_session_ends() {
+        let (folder, start) = (tempfile::tempdir().unwrap(), Instant::now());
+        let path = folder.path().join("users");
+        let (gate, anna) = gate(&path, start);
+        let good = fs::read(&path).unwrap();
+        fs::write(&path, "half a line\n").unwrap();
+        let late = start + 2 * Logins::LONGEST;
+        gate.handle_time(late);
+        assert_eq!(gate.check_users(), Err(LoginError::UnusableUsers));
+        assert!(gate.logins().contains(anna));
+        fs::write(&path, good).unwrap();
+        gate.handle_time(late);
+        assert_eq!(gate.check_users(), Ok(()));
+        assert!(!gate.logins().contains(anna), "it is too old");
+    }
+
+    #[tokio::test]
+    async fn a_user_who_is_removed_while_the_password_is_verified_is_not_logged_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("users");
+        let (gate, _) = gate(&path, now());
+        let address = ([10, 0, 0, 1], 999).into();
+        let password = || crate::users::tests::PASSWORD.to_owned();
+        gate.log_in("anna", password(), address, false)
+            .await
+            .unwrap();
+        // Polled first, it has found the user when she is removed.
+        let login = gate.log_in("anna", password(), address, false);
+        let removal = async {
+            remove(&path, "anna").unwrap();
+            gate.file.refresh().unwrap();
+        };
+        let (refused, ()) = tokio::join!(login, removal);
+        assert_eq!(refused.unwrap_err(), LoginError::Wrong);
+    }
 }

@@ -95,6 +95,9 @@ pub(super) async fn log_in(
         let words = "send a JSON object with name and password\n";
         return (StatusCode::BAD_REQUEST, words).into_response();
     };
+    if let Err(error) = gate.check_users() {
+        return shared.refuse_login(&name, address, error);
+    }
     let guesser = match gate.device(&headers, &name) {
         Some(device) => Guesser::Device(device),
         None => Guesser::Address(Source::of(address)),
@@ -120,15 +123,22 @@ pub(super) async fn log_in(
             let cookies = cookies.map(|it| (header::SET_COOKIE, it));
             (StatusCode::NO_CONTENT, AppendHeaders(cookies)).into_response()
         }
-        Err(error) => {
-            let words = error.to_string();
-            shared.note_refused_login(&name, address, &words);
-            let status = match error {
-                LoginError::Wrong => StatusCode::UNAUTHORIZED,
-                LoginError::Busy | LoginError::NoRandomness => StatusCode::SERVICE_UNAVAILABLE,
-            };
-            (status, words + "\n").into_response()
-        }
+        Err(error) => shared.refuse_login(&name, address, error),
+    }
+}
+
+impl Shared {
+    /// Records a login that fails, and answers it.
+    fn refuse_login(&self, name: &str, address: SocketAddr, error: LoginError) -> Response {
+        let words = error.to_string();
+        self.note_refused_login(name, address, &words);
+        let status = match error {
+            LoginError::Wrong => StatusCode::UNAUTHORIZED,
+            LoginError::Busy | LoginError::NoRandomness | LoginError::UnusableUsers => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
+        };
+        (status, words + "\n").into_response()
     }
 }
 

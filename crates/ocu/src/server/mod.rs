@@ -46,7 +46,7 @@ use super::base_map::BaseMap;
 use super::orders::{Access, Order};
 use super::page::{self, File};
 use super::tls::Tls;
-use super::users::UserRole;
+use super::users::{UserRole, UsersFile};
 use jaus::address::JausId;
 use jaus::node::{Node, now};
 use jaus_view::Dictionary;
@@ -132,9 +132,6 @@ impl Server {
     const STOPS_OF_PAGE: usize = 2;
     /// Maximum number of pages without the token.
     const STRANGERS: usize = 16;
-    /// Interval of checking sessions and the users file.
-    const CHECK: Duration = Duration::from_secs(1);
-
     pub(super) fn new(admission: Admission, access: Access) -> Self {
         let shared = Shared {
             admission,
@@ -203,7 +200,7 @@ impl Server {
 
     /// Ends the sessions of users that are over.
     async fn check_sessions(&self) {
-        let mut checks = interval(Self::CHECK);
+        let mut checks = interval(UsersFile::INTERVAL);
         loop {
             checks.tick().await;
             if let Some(gate) = self.shared.admission.gate.users() {

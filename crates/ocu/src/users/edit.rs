@@ -32,7 +32,7 @@ pub fn add(path: &Path, user: &User) -> Result<(), UsersError> {
 }
 
 /// Removes a user from a users file; returns whether the user was there. A running station ends
-/// the user's sessions within seconds.
+/// the user's sessions within a second.
 ///
 /// # Errors
 /// If the file cannot be read or written, or has a malformed line.

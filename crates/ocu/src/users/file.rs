@@ -2,9 +2,10 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::time::Duration;
 
-use jaus_files::{FileStamp, Readers};
+use jaus_files::{Followed, Readers};
 
 use super::{User, UserRole, Users};
 
@@ -19,6 +20,14 @@ pub enum UsersError {
         path: PathBuf,
         /// The reason.
         source: io::Error,
+    },
+    /// The file has a malformed line.
+    #[error("the users file {}, {source}", .path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The line, and what is wrong.
+        source: Box<Self>,
     },
     /// A line is malformed.
     #[error("line {line}: {source}")]
@@ -85,58 +94,50 @@ pub(super) const LONGEST: u64 = 256 << 10;
 
 /// The users of a running station. Clones share them.
 #[derive(Clone, Debug)]
-pub struct UsersFile {
-    path: Arc<Path>,
-    content: Arc<Mutex<Content>>,
-}
-
-#[derive(Debug)]
-struct Content {
-    users: Arc<Users>,
-    stamp: FileStamp,
-}
+pub struct UsersFile(Followed<Users, UsersError>);
 
 impl UsersFile {
+    /// How often a station calls [`refresh`](Self::refresh).
+    pub(crate) const INTERVAL: Duration = Followed::<Users, UsersError>::INTERVAL;
+
     /// Reads a users file.
     ///
     /// # Errors
     /// If it cannot be read, can be read by other users of this host, or has a malformed line.
     pub fn load(path: &Path) -> Result<Self, UsersError> {
-        let stamp = FileStamp::of(path);
-        let users = Arc::new(read(path)?);
-        Ok(Self {
-            path: path.into(),
-            content: Arc::new(Mutex::new(Content { users, stamp })),
-        })
+        let owned = path.to_owned();
+        Followed::load(vec![path.to_owned()], move || read(&owned)).map(Self)
     }
 
     /// The users as last read.
     #[must_use]
     pub fn users(&self) -> Arc<Users> {
-        let content = self.content.lock().unwrap_or_else(PoisonError::into_inner);
-        content.users.clone()
+        self.0.get()
     }
 
-    /// Reads the file again if it has changed; returns whether it has. On an error the previous
-    /// users remain.
+    /// Reads the file again if it has changed or could not be used last; returns whether the users were
+    /// replaced. On an error the previous users remain, with a [`fault`](Self::fault).
     ///
     /// # Errors
-    /// As [`load`](Self::load), once for each change.
+    /// As [`load`](Self::load), once for each fault.
     pub fn refresh(&self) -> Result<bool, UsersError> {
-        let stamp = FileStamp::of(&self.path);
-        let mut content = self.content.lock().unwrap_or_else(PoisonError::into_inner);
-        if content.stamp == stamp {
-            return Ok(false);
-        }
-        content.stamp = stamp;
-        content.users = Arc::new(read(&self.path)?);
-        Ok(true)
+        self.0.refresh()
+    }
+
+    /// Why the file could not be used last; `None` if it could. The previous users may lack a change.
+    #[must_use]
+    pub fn fault(&self) -> Option<Arc<str>> {
+        self.0.fault()
     }
 }
 
 fn read(path: &Path) -> Result<Users, UsersError> {
     let text = jaus_files::read_text(path, Readers::Owner, LONGEST);
-    Users::parse(&text.map_err(|source| UsersError::in_file(path, source))?)
+    let text = text.map_err(|source| UsersError::in_file(path, source))?;
+    Users::parse(&text).map_err(|source| UsersError::Malformed {
+        path: path.to_owned(),
+        source: Box::new(source),
+    })
 }
 
 #[cfg(test)]
@@ -148,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_of_the_file_is_noticed_and_an_unusable_one_changes_nothing() {
+    fn a_change_of_the_file_is_noticed_and_an_unusable_one_leaves_the_users_with_a_fault() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("users");
         add(&path, &user("anna", UserRole::Drive)).unwrap();
@@ -161,10 +162,14 @@ mod tests {
         assert!(file.refresh().is_err());
         assert!(!file.refresh().unwrap(), "an error is reported once");
         assert_eq!(file.users().iter().len(), 2);
+        let fault = file.fault().unwrap();
+        let named = format!("the users file {}, line 1: ", path.display());
+        assert!(fault.starts_with(&named), "{fault}");
         fs::remove_file(&path).unwrap();
         assert!(file.refresh().is_err());
         add(&path, &user("carl", UserRole::Drive)).unwrap();
         assert!(file.refresh().unwrap());
+        assert_eq!(file.fault(), None);
         remove(&path, "carl").unwrap();
         assert!(file.refresh().unwrap());
         assert_eq!(file.users().iter().len(), 0);

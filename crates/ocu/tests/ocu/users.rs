@@ -367,6 +367,38 @@ async fn the_sessions_of_a_removed_user_end_and_those_of_others_go_on() {
 }
 
 #[tokio::test]
+async fn with_an_unusable_users_file_nobody_logs_in_and_those_who_have_still_stop_vehicles() {
+    let guarded = Guarded::new().await;
+    let cookie = guarded.login("carl").await;
+    let mut page = guarded.page(&cookie).await;
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    let good = std::fs::read(guarded.users()).unwrap();
+    std::fs::write(guarded.users(), "half a line\n").unwrap();
+    let answers = async |status: &str| {
+        loop {
+            let (head, body) = guarded.try_login("ben", PASSWORD).await;
+            if head.starts_with(status) {
+                return body;
+            }
+        }
+    };
+    let refused = within_limit(answers("HTTP/1.1 503")).await;
+    assert!(refused.contains("the file of the users"), "{refused}");
+    until(|| guarded.has_recorded(&["ben", "login", "refused", "nobody can log in"])).await;
+
+    let stop = json!({"type": "emergency", "on": true});
+    page.ask(stop.clone()).await.unwrap();
+    page.until(|state| state["vehicle"]["emergency"] == true)
+        .await;
+    let mut again = guarded.page(&cookie).await;
+    again.ask(stop).await.unwrap();
+    std::fs::write(guarded.users(), good).unwrap();
+    within_limit(answers("HTTP/1.1 204")).await;
+    again.state().await;
+}
+
+#[tokio::test]
 async fn the_audit_log_has_no_password_no_cookie_and_no_unknown_name() {
     let guarded = Guarded::new().await;
     let cookie = guarded.login("anna").await;

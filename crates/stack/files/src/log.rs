@@ -42,19 +42,26 @@ pub(crate) fn open_or_create(
                 created => return Ok((created?, true)),
             }
         }
-        // Should the file be exchanged here, a link is not followed and a pipe not waited for.
-        #[cfg(unix)]
-        {
-            use rustix::fs::OFlags;
-            let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
-            std::os::unix::fs::OpenOptionsExt::custom_flags(existing, flags.cast_signed());
-        }
-        match existing.open(path) {
+        match open_regular(path, existing) {
             // Another program has removed it.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-            Ok(file) if !file.metadata()?.is_file() => return Err(irregular()),
             opened => return Ok((opened?, false)),
         }
+    }
+}
+
+/// Opens a regular file that is there. A link is not followed, and a pipe not waited for.
+pub(crate) fn open_regular(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    #[cfg(unix)]
+    {
+        use rustix::fs::OFlags;
+        let flags = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits();
+        std::os::unix::fs::OpenOptionsExt::custom_flags(options, flags.cast_signed());
+    }
+    let file = options.open(path)?;
+    match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(irregular()),
     }
 }
 

@@ -18,11 +18,14 @@ use jaus_cli::secure::KeyFiles;
 use jaus_secure::{Grant, Key, Peer, PublicKey, Trust, edit};
 use serde_json::json;
 
+use crate::uptake::with_uptake;
+
 /// Make the key of this host's node, and choose the keys that it trusts
 ///
 /// Nodes that trust each other's keys exchange messages over an authenticated, encrypted link; see
-/// --secure-listen and --secure-peer. A running node notices a change of its trusted keys within
-/// seconds.
+/// --secure-listen and --secure-peer. A running node notices a change of its files within a second.
+/// A command that changes one waits for all running services that use it, and says whether they have
+/// taken the change.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus keys new\n  \
@@ -32,7 +35,10 @@ use serde_json::json;
     jaus keys list\n  \
     jaus keys rotate\n  \
     jaus keys ca issue rover WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s= 101.255.255 > rover.crt\n  \
-    jaus keys revoke rover")]
+    jaus keys revoke rover\n\n\
+    Exit status: 0 done, and every running service that uses the file has taken the change; 1 the \
+    file is changed, but a service has not taken the change within 2 s, or it cannot be confirmed; \
+    also 1 if there was nothing to change or list; 2 the file is not changed.")]
 pub(crate) struct Keys {
     #[command(subcommand)]
     action: Action,
@@ -215,7 +221,7 @@ impl TrustKey {
         make_folder_of(&path)?;
         let (name, ids) = (self.name.clone(), self.ids.0.clone());
         let rules = self.rules.rules()?;
-        let done = match self.proof {
+        let done = || match self.proof {
             Proof::Key(key) => {
                 let peer = Peer {
                     name,
@@ -227,30 +233,34 @@ impl TrustKey {
             }
             Proof::Certificate => edit::grant(&path, &Grant { name, ids, rules }),
         };
-        done.map_err(Failure::of)?;
-        Ok(Outcome::Done)
+        with_uptake(&path, || done().map_err(Failure::of))
     }
 }
 
 impl Allow {
     fn replace(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
-        let is_there = edit::allow(&path, &self.name, &self.rules.rules()?);
-        done_if_there(is_there.map_err(Failure::of)?, &self.name, &path)
+        let rules = self.rules.rules()?;
+        with_uptake(&path, || {
+            let is_there = edit::allow(&path, &self.name, &rules).map_err(Failure::of)?;
+            check_there(is_there, &self.name, &path)
+        })
     }
 }
 
 impl Revoke {
     fn remove(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
-        let was_there = edit::revoke(&path, &self.name, self.public_key).map_err(Failure::of)?;
-        done_if_there(was_there, &self.name, &path)
+        with_uptake(&path, || {
+            let was_there = edit::revoke(&path, &self.name, self.public_key);
+            check_there(was_there.map_err(Failure::of)?, &self.name, &path)
+        })
     }
 }
 
-fn done_if_there(is_there: bool, name: &str, path: &Path) -> Result<Outcome, Failure> {
+fn check_there(is_there: bool, name: &str, path: &Path) -> Result<(), Failure> {
     if is_there {
-        return Ok(Outcome::Done);
+        return Ok(());
     }
     Err(Failure::negative(format!(
         "`{name}` is not in {}: see `jaus keys list`",

@@ -41,6 +41,7 @@ mod subscribe;
 mod test;
 #[cfg(target_os = "linux")]
 mod up;
+mod uptake;
 mod users;
 mod vehicle;
 mod view;

@@ -10,16 +10,22 @@ use jaus_cli::output::{Output, say};
 use jaus_ocu::users::{self, PasswordHash, User, UserRole, UsersFile};
 use serde_json::json;
 
+use crate::uptake::with_uptake;
+
 /// Choose the users of the operator's page
 ///
-/// `jaus-ocu --users FILE` requires them to log in. A running station notices a change within
-/// seconds, and ends the sessions of users that were removed.
+/// `jaus-ocu --users FILE` requires them to log in. A running station notices a change within a
+/// second, and ends the sessions of users that were removed. A command that changes the file waits
+/// for all running stations that use it, and says whether they have taken the change.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus users add anna --role administer\n  \
     jaus users add ben --role drive < password.txt\n  \
     jaus users list\n  \
-    jaus users remove ben")]
+    jaus users remove ben\n\n\
+    Exit status: 0 done, and every running station that uses the file has taken the change; 1 the \
+    file is changed, but a station has not taken the change within 2 s, or it cannot be confirmed; \
+    also 1 if there was nothing to remove or list; 2 the file is not changed.")]
 pub(crate) struct UsersCommand {
     #[command(subcommand)]
     action: Action,
@@ -124,14 +130,16 @@ impl Add {
             role: self.role.into(),
             password: PasswordHash::of(&password).map_err(Failure::of)?,
         };
-        users::add(&path, &user).map_err(Failure::of)?;
-        say(format_args!(
-            "{} may {}; users log in to a station that runs with: jaus-ocu --users {}",
-            user.name,
-            user.role,
-            path.display()
-        ));
-        Ok(Outcome::Done)
+        with_uptake(&path, || {
+            users::add(&path, &user).map_err(Failure::of)?;
+            say(format_args!(
+                "{} may {}; users log in to a station that runs with: jaus-ocu --users {}",
+                user.name,
+                user.role,
+                path.display()
+            ));
+            Ok(())
+        })
     }
 }
 
@@ -154,14 +162,16 @@ fn read_password() -> Result<String, Failure> {
 impl Remove {
     fn run(&self) -> Result<Outcome, Failure> {
         let path = self.file.path()?;
-        if users::remove(&path, &self.name).map_err(Failure::of)? {
-            return Ok(Outcome::Done);
-        }
-        Err(Failure::negative(format!(
-            "`{}` is not in {}: see `jaus users list`",
-            self.name,
-            path.display()
-        )))
+        with_uptake(&path, || {
+            if users::remove(&path, &self.name).map_err(Failure::of)? {
+                return Ok(());
+            }
+            Err(Failure::negative(format!(
+                "`{}` is not in {}: see `jaus users list`",
+                self.name,
+                path.display()
+            )))
+        })
     }
 }
 

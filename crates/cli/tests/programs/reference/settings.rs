@@ -222,6 +222,7 @@ fn write_secure(page: &mut String) {
     for field in &fields {
         assert!(!field.about.is_empty(), "{} has no description", field.name);
         let value = match (&field.kind, field.name.as_str()) {
+            (_, "jsidl") => "list of paths",
             (Kind::List(_), _) => "list of addresses",
             (_, "listen") => "address",
             (_, "budget") => "rate",

@@ -3,6 +3,8 @@
 mod certificates;
 mod rights;
 mod rotation;
+#[cfg(target_os = "linux")]
+mod uptake;
 
 use std::path::PathBuf;
 
@@ -14,6 +16,9 @@ use crate::support::{Run, Running, run};
 
 /// The fields of the query: the identification of the subsystem.
 const WHICH: &str = r#"{"QueryType":2}"#;
+
+/// What a command says that has changed a file of running programs.
+const TAKEN: &str = "have taken the change";
 
 /// The folder with the keys of one host.
 struct Host(TempDir);
@@ -48,7 +53,7 @@ impl Host {
 
     fn trust(&self, name: &str, key: &str, ids: &str) {
         let trusted = self.keys(&["trust", name, key, ids]);
-        assert_eq!((trusted.status, &*trusted.stderr), (0, ""), "{trusted:?}");
+        assert_eq!((trusted.status, &*trusted.stdout), (0, ""), "{trusted:?}");
     }
 }
 
@@ -80,7 +85,7 @@ fn as_operator(host: &Host, address: &str, arguments: &[&str]) -> Run {
 
 #[test]
 fn a_vehicle_is_found_and_queried_by_a_secure_link_alone() {
-    let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.1");
+    let (_vehicle, _at_vehicle, operator, address) = vehicle_and_operator("115.1.1");
     let query = [
         "query",
         "115.1.1",
@@ -119,13 +124,11 @@ fn an_emergency_of_another_client_is_cleared_by_a_key_with_the_right_alone() {
         let command = ["control", "115.1.7", action, "--id", id, "--timeout", "2s"];
         as_operator(host, &address, &command)
     };
-    // A running node applies a change within two seconds.
-    let applied = || std::thread::sleep(std::time::Duration::from_secs(3));
-    applied();
+    // The command waits for the running vehicle.
     let allow = |name: &str, rules: &[&str]| {
         let allowed = at_vehicle.keys(&[&["allow", name], rules].concat());
         assert_eq!(allowed.status, 0, "{allowed:?}");
-        applied();
+        assert!(allowed.stderr.contains(TAKEN), "{allowed:?}");
     };
     let stopped = control(&viewer, "61.1.1", "emergency");
     assert_eq!(stopped.status, 0, "{stopped:?}");
@@ -189,7 +192,7 @@ fn two_commands_on_each_host_give_a_vehicle_and_an_operator() {
 
 #[test]
 fn an_id_for_which_a_key_may_not_speak_gets_no_answer() {
-    let (_vehicle, _, operator, address) = vehicle_and_operator("115.1.2");
+    let (_vehicle, _at_vehicle, operator, address) = vehicle_and_operator("115.1.2");
     let query = [
         "query",
         "115.1.2",
@@ -213,7 +216,7 @@ fn a_revoked_key_loses_its_link_and_gets_no_other() {
     watching.read_until("115.1.3");
     let revoked = at_vehicle.keys(&["revoke", "operator"]);
     assert_eq!(revoked.status, 0, "{revoked:?}");
-    watching.read_until("lost");
+    assert!(revoked.stderr.contains(TAKEN), "{revoked:?}");
     let query = [
         "query",
         "115.1.3",
@@ -225,6 +228,7 @@ fn a_revoked_key_loses_its_link_and_gets_no_other() {
         "60.1.1",
     ];
     assert_eq!(as_operator(&operator, &address, &query).status, 1);
+    watching.read_until("lost");
 }
 
 #[test]
@@ -285,7 +289,10 @@ fn keys_are_made_shown_listed_and_revoked_with_clear_errors() {
         "{twice:?}"
     );
     assert_eq!(host.keys(&["revoke", "nobody"]).status, 1);
-    assert_eq!(host.keys(&["revoke", "rover"]).status, 0);
+    let revoked = host.keys(&["revoke", "rover"]);
+    assert_eq!(revoked.status, 0, "{revoked:?}");
+    let unused = format!("no running service uses {}", host.file("trusted_keys"));
+    assert!(revoked.stderr.contains(&unused), "{revoked:?}");
     assert_eq!(host.keys(&["list"]).status, 1, "no key is left");
 }
 
@@ -367,6 +374,9 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
             .stderr
             .contains("authority 127, but its sender may take control with at most 100")
     });
+    let refused = as_operator(&operator, &address, &drive);
+    let words = "authority 127, but its key may take control with at most 100";
+    assert!(refused.stderr.contains(words), "{refused:?}");
     let within = drive.map(|it| if it == "127" { "100" } else { it });
     let sent = as_operator(&operator, &address, &within);
     assert_eq!(sent.status, 0, "{sent:?}");

@@ -3,9 +3,11 @@
 use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+#[cfg(target_os = "linux")]
+use jaus_test_kit::waiting::block_until;
 use tempfile::TempDir;
 
 use crate::support::{Run, own_group, run};
@@ -84,15 +86,72 @@ fn a_short_password_an_invalid_name_and_an_unknown_role_are_refused() {
     assert!(!fs::exists(host.file("users")).unwrap());
 }
 
-/// Sends a login to a station. Returns the response.
-fn log_in(address: &str, password: &str) -> String {
-    let body = format!("{{\"name\":\"anna\",\"password\":\"{}\"}}", password.trim());
-    let mut stream = TcpStream::connect(address).unwrap();
-    let head = "POST /login HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n";
-    write!(stream, "{head}Content-Length: {}\r\n\r\n{body}", body.len()).unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    answer
+/// A station whose log goes to a file, which takes any level of it at any speed.
+struct Station {
+    child: Child,
+    log: String,
+    address: String,
+}
+
+impl Station {
+    fn start(host: &Host, level: &str) -> Self {
+        let log = host.file("log");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_jaus-ocu"))
+            .args(["--listen", "127.0.0.1:0", "--users", &host.file("users")])
+            .args(own_group())
+            .env("JAUS_LOG", level)
+            .env("STATE_DIRECTORY", host.0.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(&log).unwrap())
+            .spawn()
+            .unwrap();
+        let address = loop {
+            assert_eq!(child.try_wait().unwrap(), None, "it runs");
+            let text = fs::read_to_string(&log).unwrap();
+            if let Some((_, rest)) = text.split_once("page is at http://")
+                && let Some((address, _)) = rest.split_once('/')
+            {
+                break address.to_owned();
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        Self {
+            child,
+            log,
+            address,
+        }
+    }
+
+    fn log(&self) -> String {
+        fs::read_to_string(&self.log).unwrap()
+    }
+
+    /// Sends a login. Returns the response.
+    fn log_in(&self, name: &str, password: &str) -> String {
+        let password = password.trim();
+        let body = format!("{{\"name\":\"{name}\",\"password\":\"{password}\"}}");
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        let head = "POST /login HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n";
+        write!(stream, "{head}Content-Length: {}\r\n\r\n{body}", body.len()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    }
+
+    #[cfg(target_os = "linux")]
+    fn signal(&self, signal: &str) {
+        let id = self.child.id().to_string();
+        let kill = Command::new("kill").args([signal, &id]).status();
+        assert!(kill.unwrap().success());
+    }
+}
+
+impl Drop for Station {
+    fn drop(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
 }
 
 #[test]
@@ -100,40 +159,72 @@ fn no_log_level_shows_a_password_or_a_cookie() {
     const WRONG: &str = "a wrong password";
     let host = Host::new();
     host.add("anna", "drive");
-    // A file takes the output of this level at any speed.
-    let log = host.file("log");
-    let mut station = Command::new(env!("CARGO_BIN_EXE_jaus-ocu"))
-        .args(["--listen", "127.0.0.1:0", "--users", &host.file("users")])
-        .args(own_group())
-        .env("JAUS_LOG", "trace")
-        .env("STATE_DIRECTORY", host.0.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(fs::File::create(&log).unwrap())
-        .spawn()
-        .unwrap();
-    let address = loop {
-        assert_eq!(station.try_wait().unwrap(), None, "it runs");
-        let text = fs::read_to_string(&log).unwrap();
-        if let Some((_, rest)) = text.split_once("page is at http://")
-            && let Some((address, _)) = rest.split_once('/')
-        {
-            break address.to_owned();
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    };
-    assert!(log_in(&address, WRONG).starts_with("HTTP/1.1 401"));
-    let answer = log_in(&address, PASSWORD);
+    let station = Station::start(&host, "trace");
+    assert!(station.log_in("anna", WRONG).starts_with("HTTP/1.1 401"));
+    let answer = station.log_in("anna", PASSWORD);
     let (_, cookie) = answer.split_once("set-cookie: ").unwrap();
     let (_, secret) = cookie.split_once('=').unwrap();
     let secret = secret.split(';').next().unwrap();
-    station.kill().unwrap();
-    station.wait().unwrap();
-    let text = fs::read_to_string(&log).unwrap();
+    let text = station.log();
     assert!(text.contains("login of anna"), "{text}");
     for word in [WRONG, PASSWORD.trim(), secret] {
         assert!(!text.contains(word), "{word} is in {text}");
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_removal_is_confirmed_by_the_station_and_one_that_hangs_is_named() {
+    const TAKEN: &str = "have taken the change";
+    let host = Host::new();
+    for name in ["anna", "ben", "carl"] {
+        host.add(name, "drive");
+    }
+    let station = Station::start(&host, "info");
+    let status = |name: &str| {
+        let answer = station.log_in(name, PASSWORD);
+        answer.split(' ').nth(1).unwrap().to_owned()
+    };
+    assert_eq!(status("ben"), "204");
+    let removed = host.users(&["remove", "ben"], "");
+    assert_eq!(removed.status, 0, "{removed:?}");
+    assert!(removed.stderr.contains(TAKEN), "{removed:?}");
+    assert_eq!(status("ben"), "401");
+    let log = station.log();
+    assert!(log.contains("session of ben has ended"), "{log}");
+
+    station.signal("-STOP");
+    let removed = host.users(&["remove", "carl"], "");
+    assert_eq!(removed.status, 1, "{removed:?}");
+    let named = format!("still used by jaus-ocu (process {})", station.child.id());
+    assert!(removed.stderr.contains(&named), "{removed:?}");
+    station.signal("-CONT");
+    let added = host.add("dora", "observe");
+    assert_eq!(added.status, 0, "{added:?}");
+    assert!(added.stderr.contains(TAKEN), "{added:?}");
+    assert_eq!([status("dora"), status("carl")], ["204", "401"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_users_file_that_becomes_unusable_refuses_logins_and_the_log_names_who_remains() {
+    let host = Host::new();
+    host.add("anna", "drive");
+    let station = Station::start(&host, "info");
+    assert!(station.log_in("anna", PASSWORD).starts_with("HTTP/1.1 204"));
+    let good = fs::read(host.file("users")).unwrap();
+    fs::write(host.file("users"), "half a line\n").unwrap();
+    block_until(|| station.log_in("anna", PASSWORD).starts_with("HTTP/1.1 503"));
+    let log = station.log();
+    for words in [
+        "line 1: `a` is not a role",
+        "the sessions of the connected users remain",
+        "connected=\"anna\"",
+    ] {
+        assert!(log.contains(words), "{words} in {log}");
+    }
+    fs::write(host.file("users"), good).unwrap();
+    block_until(|| station.log_in("anna", PASSWORD).starts_with("HTTP/1.1 204"));
 }
 
 #[cfg(unix)]

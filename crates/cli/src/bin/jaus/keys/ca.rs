@@ -19,6 +19,7 @@ use jaus_secure::ca::{CertificateAuthority, Issued, Request};
 use serde_json::json;
 
 use super::Ids;
+use crate::uptake::with_uptake;
 
 /// Seconds of a day.
 const DAY: u64 = 24 * 60 * 60;
@@ -178,20 +179,23 @@ impl Issue {
 
 impl Revoke {
     fn revoke(&self) -> Result<Outcome, Failure> {
-        let revoked = self.folder.open()?.revoke(&self.which, SystemTime::now());
-        let revoked = revoked.map_err(Failure::of)?;
-        if revoked.is_empty() {
-            return Err(Failure::negative(format!(
-                "no valid certificate has the name or serial number `{}`: see `jaus keys ca list`",
-                self.which
-            )));
-        }
-        say(format_args!(
-            "{} revoked; copy {} to each node",
-            counted(revoked.len(), "certificate"),
-            self.folder.path()?.join("ca.crl").display()
-        ));
-        Ok(Outcome::Done)
+        let list = self.folder.path()?.join("ca.crl");
+        with_uptake(&list, || {
+            let revoked = self.folder.open()?.revoke(&self.which, SystemTime::now());
+            let revoked = revoked.map_err(Failure::of)?;
+            if revoked.is_empty() {
+                return Err(Failure::negative(format!(
+                    "no valid certificate has the name or serial number `{}`: see `jaus keys ca list`",
+                    self.which
+                )));
+            }
+            say(format_args!(
+                "{} revoked; copy {} to each node",
+                counted(revoked.len(), "certificate"),
+                list.display()
+            ));
+            Ok(())
+        })
     }
 }
 

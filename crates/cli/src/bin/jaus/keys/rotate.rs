@@ -8,6 +8,8 @@ use jaus_cli::output::{Output, say};
 use jaus_cli::secure::KeyFiles;
 use jaus_secure::Key;
 
+use crate::uptake::with_uptake;
+
 /// Replace the key without stopping the node: first make the next one, then use it
 ///
 /// Without --finish it makes the next key and prints its public key, which each peer trusts beside
@@ -58,10 +60,11 @@ fn finish(path: &Path) -> Result<Outcome, Failure> {
             "there is no next key: `jaus keys rotate` makes one, which peers then trust",
         ));
     }
-    let key = Key::replace_by_next(path).map_err(Failure::of)?.public();
-    say(format_args!(
-        "the key is replaced; on each peer run: jaus keys revoke NAME {old}"
-    ));
-    Output::new().line(key)?;
-    Ok(Outcome::Done)
+    with_uptake(path, || {
+        let key = Key::replace_by_next(path).map_err(Failure::of)?.public();
+        say(format_args!(
+            "the key is replaced; on each peer run: jaus keys revoke NAME {old}"
+        ));
+        Output::new().line(key)
+    })
 }

@@ -92,6 +92,7 @@ fn a_certificate_needs_no_trust_file_and_is_revoked_by_one_command() {
     watching.read_until("115.1.6");
     let revoked = office.ca(&["revoke", "operator"]);
     assert_eq!(revoked.status, 0, "{revoked:?}");
+    assert!(revoked.stderr.contains(TAKEN), "{revoked:?}");
     watching.read_until("lost");
     let refused = office.query(&operator, &address, "115.1.6", "1s");
     assert_eq!(refused.status, 2, "its own node notices it: {refused:?}");

@@ -38,6 +38,7 @@ fn a_key_is_replaced_while_the_vehicle_runs() {
     let finished = at_vehicle.keys(&["rotate", "--finish"]);
     assert_eq!((finished.status, finished.stdout.trim()), (0, &*next));
     assert!(finished.stderr.contains(&old), "{finished:?}");
+    assert!(finished.stderr.contains(TAKEN), "{finished:?}");
     assert_eq!(operator.keys(&["revoke", "rover", &old]).status, 0);
     let listed = operator.keys(&["list", "--json"]).only_line();
     assert_eq!(listed["key"], next);
