@@ -111,7 +111,7 @@ impl Endpoint {
             return Err(Counter::NotForUs);
         }
         let rate = self.config.routing.broadcasts;
-        if !self.broadcasts.take(now, rate, 1) {
+        if self.broadcasts.take(now, rate, 1).is_err() {
             return Err(Counter::ForwardRate);
         }
         Ok((hops, Version::As5669a))

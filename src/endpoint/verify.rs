@@ -231,8 +231,8 @@ impl Endpoint {
             return true;
         }
         let octets = u32::try_from(octets).unwrap_or(u32::MAX);
-        let may = self.unverified.take_many(now, to.into(), octets)
-            && self.unverified_total.take_many(now, (), octets);
+        let may = self.unverified.take_many(now, to.into(), octets).is_ok()
+            && self.unverified_total.take_many(now, (), octets).is_ok();
         let much = self.config.unverified_address.burst / 4;
         if self.unverified.owes(now, &to.into(), much) {
             self.challenge(now, id);

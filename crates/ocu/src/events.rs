@@ -10,11 +10,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
+use jaus_limits::{Bucket, Rate};
 use jaus_view::Timestamp;
 
 use super::missing::Absence;
 use super::picture::Picture;
-use super::server::bounds::{Bucket, Rate};
 use super::state::{self, age};
 
 /// The events of all vehicles of the station.
@@ -104,7 +104,7 @@ pub(super) struct EventInputs<'a> {
 }
 
 /// The last observation of a vehicle.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Observed {
     facts: Facts,
     bucket: Bucket,
@@ -149,11 +149,10 @@ impl EventLog {
     const MOST_SENT: usize = 200;
     /// Limit of the length of a text, in characters.
     const MOST_TEXT: usize = 240;
-    /// Events of one vehicle.
-    const RATE: Rate = Rate {
-        burst: 20,
-        period: Duration::from_secs(2),
-    };
+    /// Events of one vehicle: 20 at once, and one each 2 s.
+    const RATE: Rate = Rate::new(1, 40);
+    /// Tokens of a vehicle for each.
+    const EVENT: u32 = 2;
     /// A change of the emergency within this time after a request for it is its effect.
     const EFFECT: Duration = Duration::from_secs(10);
     /// Minimum interval between refused setpoints, and between holds, of one vehicle in the log.
@@ -185,7 +184,7 @@ impl EventLog {
         on: bool,
     ) {
         for &vehicle in vehicles {
-            let observed = self.observed(now, vehicle);
+            let observed = self.observed(vehicle);
             let last = observed.requested.replace(Requested {
                 on,
                 user: Arc::clone(user),
@@ -217,7 +216,7 @@ impl EventLog {
     }
 
     fn handle_facts(&mut self, now: EventTime, vehicle: u16, new: Facts) {
-        let observed = self.observed(now, vehicle);
+        let observed = self.observed(vehicle);
         if observed.facts == new {
             return;
         }
@@ -241,20 +240,17 @@ impl EventLog {
         self.vehicles.retain(|&vehicle, _| is_listed(vehicle));
     }
 
-    fn observed(&mut self, now: EventTime, vehicle: u16) -> &mut Observed {
-        self.vehicles.entry(vehicle).or_insert_with(|| Observed {
-            facts: Facts::default(),
-            bucket: Bucket::new(now.at),
-            omitted: 0,
-            requested: None,
-            held_at: None,
-            refused_at: None,
-        })
+    fn observed(&mut self, vehicle: u16) -> &mut Observed {
+        self.vehicles.entry(vehicle).or_default()
     }
 
     fn log(&mut self, now: EventTime, vehicle: u16, kind: EventKind, level: Level, text: &str) {
-        let observed = self.observed(now, vehicle);
-        if observed.bucket.take(now.at, Self::RATE).is_err() {
+        let observed = self.observed(vehicle);
+        if observed
+            .bucket
+            .take(now.at, Self::RATE, Self::EVENT)
+            .is_err()
+        {
             observed.omitted += 1;
             return;
         }

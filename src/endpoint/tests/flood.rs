@@ -102,7 +102,7 @@ fn flood(hosts: u32, config: Config) -> Rig {
 fn is_bounded(rig: &Rig) {
     let config = Config::default();
     assert!(rig.endpoint.peers().count() <= config.limits.max_peers);
-    assert!(rig.endpoint.gate.new_ids.own.len() <= config.limits.max_peers);
+    assert!(rig.endpoint.gate.new_ids.len() <= config.limits.max_peers);
     assert!(rig.endpoint.heard.len() <= config.max_recent * 5 / 2);
     assert!(rig.endpoint.reassembly.cost() <= config.max_reassembly);
     assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));

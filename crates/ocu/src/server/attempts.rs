@@ -3,22 +3,20 @@
 
 use std::time::{Duration, Instant};
 
+use jaus_limits::{Buckets, Rate};
 use jaus_view::places::Source;
 
-use super::bounds::{Buckets, Rate};
 use super::devices::DeviceId;
 
-/// Failed logins of one device or of one address.
-const BY_GUESSER: Rate = Rate {
-    burst: 5,
-    period: Duration::from_secs(10),
-};
+/// Failed logins of one device or of one address: five at once, and one each 10 s.
+const BY_GUESSER: Rate = Rate::new(1, 50);
+/// Tokens of a guesser for each.
+const GUESS: u32 = 10;
 /// Failed logins of one user from all addresses together. Beyond them logins from addresses are
-/// slowed, not refused: otherwise anyone could lock a user out.
-const BY_USER: Rate = Rate {
-    burst: 10,
-    period: Duration::from_secs(5),
-};
+/// slowed, not refused: otherwise anyone could lock a user out. Ten at once, and one each 5 s.
+const BY_USER: Rate = Rate::new(1, 50);
+/// Tokens of a user for each.
+const GUESS_OF_USER: u32 = 5;
 /// Delay of a login while the user's password is being guessed.
 const SLOWED: Duration = Duration::from_secs(1);
 /// The most guessers, and the most users, whose failures are remembered.
@@ -43,8 +41,8 @@ pub(super) struct Attempts {
 impl Attempts {
     pub(super) fn new() -> Self {
         Self {
-            by_guesser: Buckets::new(BY_GUESSER, REMEMBERED),
-            by_user: Buckets::new(BY_USER, REMEMBERED),
+            by_guesser: Buckets::displacing(BY_GUESSER, REMEMBERED),
+            by_user: Buckets::displacing(BY_USER, REMEMBERED),
         }
     }
 
@@ -59,21 +57,26 @@ impl Attempts {
         guesser: &Guesser,
         user: &str,
     ) -> Result<Duration, Duration> {
-        self.by_guesser.take(now, guesser)?;
+        self.by_guesser.take_many(now, guesser.clone(), GUESS)?;
         match guesser {
             Guesser::Device(_) => Ok(Duration::ZERO),
             Guesser::Address(_) => {
-                let is_quiet = self.by_user.take(now, &user.to_owned()).is_ok();
-                Ok(if is_quiet { Duration::ZERO } else { SLOWED })
+                let user = user.to_owned();
+                let is_quiet = self.by_user.take_many(now, user, GUESS_OF_USER);
+                Ok(if is_quiet.is_ok() {
+                    Duration::ZERO
+                } else {
+                    SLOWED
+                })
             }
         }
     }
 
     /// The attempt was successful.
     pub(super) fn succeeded(&mut self, guesser: &Guesser, user: &str) {
-        self.by_guesser.give_back(guesser);
+        self.by_guesser.give_back(guesser, GUESS);
         if matches!(guesser, Guesser::Address(_)) {
-            self.by_user.give_back(&user.to_owned());
+            self.by_user.give_back(&user.to_owned(), GUESS_OF_USER);
         }
     }
 }
@@ -93,7 +96,7 @@ mod tests {
         let allowed = (0..100).filter(|_| attempts.begin(now, &at(1), "anna").is_ok());
         assert_eq!(allowed.count(), 5);
         let wait = attempts.begin(now, &at(1), "ben").unwrap_err();
-        assert_eq!(wait, BY_GUESSER.period);
+        assert_eq!(wait, Duration::from_secs(10));
         assert_eq!(attempts.begin(now, &at(2), "anna"), Ok(Duration::ZERO));
         assert!(attempts.begin(now + wait, &at(1), "ben").is_ok());
     }

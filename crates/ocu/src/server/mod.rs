@@ -3,7 +3,7 @@
 
 mod attempts;
 mod base_map;
-pub(super) mod bounds;
+mod bounds;
 mod connections;
 mod devices;
 mod gate;

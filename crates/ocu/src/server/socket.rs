@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
+use jaus_limits::Bucket;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
 use super::Shared;
-use super::bounds::{Bucket, FRAMES};
+use super::bounds::FRAMES;
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
 use crate::answer::Said as Answer;
@@ -117,7 +118,7 @@ pub(super) async fn serve(
         snapshots: snapshots.clone(),
         answers,
         views,
-        frames: Bucket::new(now()),
+        frames: Bucket::default(),
         wrong_tokens: 0,
         refused: None,
     };
@@ -203,7 +204,7 @@ impl Reader<'_> {
                     return Some((close_code::SIZE, "frames are limited to 4096 octets"));
                 }
             };
-            if self.frames.take(now(), FRAMES).is_err() {
+            if self.frames.take(now(), FRAMES, 1).is_err() {
                 self.shared.counters.too_much.fetch_add(1, Relaxed);
                 return Some((
                     close_code::POLICY,

@@ -15,11 +15,12 @@ use std::time::Duration;
 
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::SinkExt;
+use jaus_limits::Bucket;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 
 use super::Shared;
-use super::bounds::{Bucket, FRAMES};
+use super::bounds::FRAMES;
 use super::socket::{Parting, supervise};
 use super::visitor::Visitor;
 use crate::orders::{StopOrder, StopReply, StopTarget, TakenStop};
@@ -67,7 +68,7 @@ impl<'s> Stops<'s> {
         Self {
             shared,
             visitor,
-            frames: Bucket::new(now()),
+            frames: Bucket::default(),
             answers,
             waiting,
         }
@@ -112,7 +113,7 @@ impl<'s> Stops<'s> {
     }
 
     async fn handle(&mut self, message: Message) -> Option<Parting> {
-        if self.frames.take(now(), FRAMES).is_err() {
+        if self.frames.take(now(), FRAMES, 1).is_err() {
             self.shared.counters.too_much.fetch_add(1, Relaxed);
             return Some((close_code::POLICY, "too many frames"));
         }

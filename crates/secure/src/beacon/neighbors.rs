@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
 use std::time::{Duration, Instant};
 
-use jaus::endpoint::{Buckets, Rate};
+use jaus_limits::{Buckets, Rate, quota_address};
 
 use super::{Beacon, Received, Stamp};
 use crate::key::{Fingerprint, PublicKey};
@@ -12,12 +12,12 @@ use crate::trust::TrustFile;
 
 /// How long a beacon counts. A dial ends when the last beacon of its peer is older.
 pub(crate) const LIFETIME: Duration = Duration::from_secs(30);
-/// Signature checks for one address. A check takes some 50 µs, and a node sends a beacon every 2 s
-/// or 5 s.
-const CHECKS: Rate = Rate::new(4, 16);
-/// Addresses with a limit of their own. The others share one, so all checks together take about 1 %
-/// of a processor even if their senders invent addresses.
-const ADDRESSES: usize = 64;
+/// Signature checks of one key's beacons from one address. A check takes some 50 µs, and a node sends
+/// a beacon every 2 s or 5 s.
+const CHECKS: Rate = Rate::new(1, 8);
+/// Addresses with a limit of their own for each trusted key. The others share one, so the checks for
+/// one key take less than 0.1 % of a processor even if their senders invent addresses.
+const ADDRESSES: usize = 16;
 
 jaus::counters! {
     /// Counts of received beacons.
@@ -32,8 +32,8 @@ jaus::counters! {
     Misplaced = "beacons ignored: from another address",
     /// Beacons that were not newer than an earlier one of their key.
     Replayed = "beacons ignored: not newer than the last one",
-    /// Beacons whose signature was not checked, because too many came from their address.
-    Limited = "beacons ignored: too many from one address",
+    /// Beacons whose signature was not checked, because too many of their key came from their address.
+    Limited = "beacons ignored: too many of one key from one address",
     Forged = "beacons ignored: wrong signature",
     /// Beacons of ids for which their key may not speak.
     ForeignIds = "beacons ignored: id that their key may not use",
@@ -59,11 +59,51 @@ pub struct Neighbors {
     trust: TrustFile,
     /// The edition of the trust that `keys` are from.
     edition: Option<u64>,
-    keys: HashMap<Fingerprint, PublicKey>,
-    /// The last beacon of each key, and when it came. Only trusted keys have one.
-    last: HashMap<PublicKey, (Stamp, Instant)>,
-    checks: Buckets<IpAddr>,
+    keys: HashMap<Fingerprint, Candidate>,
     counters: Counters,
+}
+
+/// A trusted key, and what beacons have shown of it.
+#[derive(Debug)]
+struct Candidate {
+    key: PublicKey,
+    /// Its last beacon, and when it came.
+    last: Option<(Stamp, Instant)>,
+    checks: Buckets<IpAddr>,
+    /// The address of its last beacon, with a limit that no other address can use up.
+    home: Option<(IpAddr, Buckets<()>)>,
+}
+
+impl Candidate {
+    fn new(key: PublicKey) -> Self {
+        Self {
+            key,
+            last: None,
+            checks: Buckets::new(CHECKS, ADDRESSES),
+            home: None,
+        }
+    }
+
+    fn is_replayed(&self, now: Instant, stamp: Stamp) -> bool {
+        self.last
+            .is_some_and(|(last, at)| stamp <= last && now < at + LIFETIME)
+    }
+
+    /// Whether the signature of a beacon from this address may be checked.
+    fn may_check(&mut self, now: Instant, from: IpAddr) -> bool {
+        match &mut self.home {
+            Some((home, checks)) if *home == from => checks.take(now, ()),
+            _ => self.checks.take(now, quota_address(from)),
+        }
+    }
+
+    /// Notes a beacon that the key has signed.
+    fn note(&mut self, now: Instant, from: IpAddr, stamp: Stamp) {
+        self.last = Some((stamp, now));
+        if self.home.as_ref().is_none_or(|(home, _)| *home != from) {
+            self.home = Some((from, Buckets::new(CHECKS, 1)));
+        }
+    }
 }
 
 impl Neighbors {
@@ -75,8 +115,6 @@ impl Neighbors {
             trust,
             edition: None,
             keys: HashMap::new(),
-            last: HashMap::new(),
-            checks: Buckets::new(CHECKS, ADDRESSES),
             counters: Counters::default(),
         }
     }
@@ -115,28 +153,23 @@ impl Neighbors {
         if claim.fingerprint == self.own {
             return Err(Counter::Own);
         }
-        let key = self.keys.get(&claim.fingerprint).copied();
-        let key = key.ok_or(Counter::Unknown)?;
+        let candidate = self.keys.get_mut(&claim.fingerprint);
+        let candidate = candidate.ok_or(Counter::Unknown)?;
+        let key = candidate.key;
         let address = link_address(claim, from).ok_or(Counter::Misplaced)?;
-        if self.is_replayed(now, key, claim.stamp) {
-            return Err(Counter::Replayed);
-        }
-        if !self.checks.take(now, from.ip()) {
-            return Err(Counter::Limited);
-        }
-        let beacon = received.verify(key).ok_or(Counter::Forged)?;
         let peer = self.trust.find(key).ok_or(Counter::Unknown)?;
-        if !beacon.may_come_from(&peer.ids) {
+        if !claim.may_come_from(&peer.ids) {
             return Err(Counter::ForeignIds);
         }
-        self.last.insert(key, (beacon.stamp, now));
+        if candidate.is_replayed(now, claim.stamp) {
+            return Err(Counter::Replayed);
+        }
+        if !candidate.may_check(now, from.ip()) {
+            return Err(Counter::Limited);
+        }
+        received.verify(key).ok_or(Counter::Forged)?;
+        candidate.note(now, from.ip(), claim.stamp);
         Ok(Sighting { key, address })
-    }
-
-    fn is_replayed(&self, now: Instant, key: PublicKey, stamp: Stamp) -> bool {
-        self.last
-            .get(&key)
-            .is_some_and(|&(last, at)| stamp <= last && now < at + LIFETIME)
     }
 
     /// Computes the fingerprints again if the trusted keys have changed.
@@ -146,12 +179,16 @@ impl Neighbors {
             return;
         }
         self.edition = Some(edition);
-        let keys = self.trust.keys();
-        self.last.retain(|key, _| keys.contains(key));
-        self.keys = keys
-            .into_iter()
-            .map(|key| (key.fingerprint(), key))
-            .collect();
+        let mut known = std::mem::take(&mut self.keys);
+        let candidates = self.trust.keys().into_iter().map(|key| {
+            let fingerprint = key.fingerprint();
+            let candidate = known.remove(&fingerprint);
+            (
+                fingerprint,
+                candidate.unwrap_or_else(|| Candidate::new(key)),
+            )
+        });
+        self.keys = candidates.collect();
     }
 }
 

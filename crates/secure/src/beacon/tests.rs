@@ -120,6 +120,7 @@ fn no_octet_of_a_beacon_can_be_changed() {
         Counter::Malformed,
         Counter::Unknown,
         Counter::Misplaced,
+        Counter::ForeignIds,
         Counter::Forged,
     ];
     let refused: u64 = reasons.map(|reason| scene.count(reason)).iter().sum();
@@ -203,8 +204,7 @@ fn a_revoked_key_is_not_found() {
 #[test]
 fn a_flood_costs_few_signature_checks_and_keeps_no_other_address_out() {
     let mut scene = Scene::new();
-    let mut forged = scene.signed(2).to_vec();
-    forged[LENGTH - 1] ^= 1;
+    let forged = forged(&scene.beacon(2));
     for _ in 0..100_000 {
         assert_eq!(scene.hears(&forged), None);
     }
@@ -229,14 +229,63 @@ fn a_flood_from_invented_addresses_costs_a_bounded_number_of_signature_checks() 
             address,
             ..scene.beacon(2)
         };
-        let mut forged = [&beacon.encode()[..], &[0; SIGNATURE]].concat();
-        forged[LENGTH - 1] = 1;
         let from = SocketAddr::new(address, 40_000);
-        assert_eq!(scene.operator.handle(scene.now, from, &forged), None);
+        assert_eq!(
+            scene.operator.handle(scene.now, from, &forged(&beacon)),
+            None
+        );
     }
     // One for each address that has a limit of its own, and the burst of the others.
     let forged = scene.count(Counter::Forged);
-    assert!(forged <= 64 + 16, "{forged}");
+    assert!(forged <= 16 + 8, "{forged}");
+}
+
+/// A beacon with a signature that its key has not made.
+fn forged(beacon: &Beacon) -> Vec<u8> {
+    [&beacon.encode()[..], &[1; SIGNATURE]].concat()
+}
+
+#[test]
+fn a_peer_in_sight_stays_so_while_a_forger_invents_addresses_with_its_fingerprint() {
+    let mut scene = Scene::new();
+    let first = scene.signed(1);
+    assert!(scene.hears(&first).is_some());
+    for second in 2..60 {
+        scene.now += SECOND;
+        for host in 2..=255 {
+            let beacon = Beacon {
+                address: from(host).ip(),
+                ..scene.beacon(1000)
+            };
+            let sighting = scene
+                .operator
+                .handle(scene.now, from(host), &forged(&beacon));
+            assert_eq!(sighting, None);
+        }
+        let honest = scene.signed(second);
+        assert!(scene.hears(&honest).is_some(), "second {second}");
+    }
+}
+
+#[test]
+fn beacons_forged_with_one_fingerprint_keep_no_other_key_at_that_address_out() {
+    let mut scene = Scene::new();
+    let other = key();
+    let lines = [(&scene.rover, 101), (&other, 102)]
+        .map(|(key, id)| format!("rover{id} {} {id}.255.255\n", key.public()));
+    let trust = TrustFile::of(Trust::parse(&lines.concat()).unwrap());
+    scene.operator = Neighbors::new(key().public(), trust);
+    for seconds in 0..1000 {
+        let beacon = forged(&scene.beacon(seconds));
+        assert_eq!(scene.hears(&beacon), None);
+    }
+    let beacon = Beacon {
+        fingerprint: other.public().fingerprint(),
+        subsystem: 102,
+        ..scene.beacon(1)
+    };
+    let beacon = beacon.sign(&other).unwrap();
+    assert!(scene.operator.handle(scene.now, from(1), &beacon).is_some());
 }
 
 #[test]

@@ -18,6 +18,10 @@ const LONGEST: usize = 1 << 16;
 /// stay below [`LONGEST`].
 const MOST: usize = 32;
 
+/// The receive buffer to request, in octets. In a flood it holds what arrives while the node is busy; the
+/// system may grant less.
+const RECEIVE_BUFFER: usize = 4 << 20;
+
 /// A bound socket. Must be used within a tokio runtime.
 #[derive(Debug)]
 pub(super) struct Socket {
@@ -31,8 +35,10 @@ impl Socket {
     pub(super) fn bind(address: SocketAddr) -> io::Result<Self> {
         let socket = std::net::UdpSocket::bind(address)?;
         socket.set_nonblocking(true)?;
+        let state = UdpSocketState::new((&socket).into())?;
+        state.set_recv_buffer_size((&socket).into(), RECEIVE_BUFFER)?;
         Ok(Self {
-            state: UdpSocketState::new((&socket).into())?,
+            state,
             io: Watched::new(socket)?,
             buffer: vec![0; SLOTS * LONGEST].into(),
         })

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use jaus::endpoint::SessionId;
 
-use super::{Session, Transport};
+use super::{Session, Transport, tokens, zone};
 use crate::beacon::{self, Sighting};
 use crate::key::PublicKey;
 
@@ -159,8 +159,9 @@ impl Transport {
             let Some(address) = self.dials[index].start(now) else {
                 continue;
             };
-            let client = self.client.clone();
-            match self.endpoint.connect(now, client, address, "jaus") {
+            let (client, name) = (self.client.clone(), tokens::name_of(address));
+            let inside = zone::embed(address);
+            match self.endpoint.connect(now, client, inside, &name) {
                 Ok((handle, connection)) => {
                     let id = self.insert(Session::new(handle, connection, Some(index)));
                     self.dials[index].session = Some(id);

@@ -7,14 +7,19 @@ use std::num::NonZeroU32;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use jaus::endpoint::{Bucket, Rate};
+use jaus_limits::{Bucket, Rate};
 
-use super::{Session, Transport};
+use super::{Session, Transport, zone};
 
 /// The fraction of a second whose octets may be sent at once after a pause.
 const BURST: u32 = 10;
 /// The least burst: two datagrams.
 const LEAST_BURST: u32 = 3000;
+
+/// The share of the budget for answers outside of sessions, as a divisor: forged packets cause them.
+const RESPONSE_SHARE: u32 = 8;
+/// Answers outside of sessions that are sent before the sessions have their turn.
+const RESPONSES_AT_ONCE: usize = 16;
 
 /// UDP datagrams for the owner to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,6 +40,8 @@ pub struct Datagrams {
 pub(super) struct Budget {
     rate: Rate,
     bucket: Bucket,
+    /// The share of answers outside of sessions.
+    responses: Bucket,
     /// Octets paid for: those of datagrams when connections take them, and of whatever else they
     /// send. Never less than `sent`.
     paid: u64,
@@ -51,6 +58,7 @@ impl Budget {
         Self {
             rate: Rate::new(octets, (octets / BURST).max(LEAST_BURST)),
             bucket: Bucket::default(),
+            responses: Bucket::default(),
             paid: 0,
             sent: 0,
             ready: None,
@@ -67,6 +75,17 @@ impl Budget {
         let burst = self.rate.time_for(self.rate.burst);
         let wait = self.bucket.debt(now).saturating_sub(burst);
         (!wait.is_zero()).then_some(wait)
+    }
+
+    /// Whether an answer outside of sessions may be sent.
+    pub(super) fn admits_response(&mut self, now: Instant, octets: usize) -> bool {
+        let is_admitted = self.responses.debt(now) < self.rate.time_for(self.rate.burst);
+        if is_admitted {
+            let octets = u32::try_from(octets).unwrap_or(u32::MAX);
+            let time = RESPONSE_SHARE * self.rate.time_for(octets);
+            self.responses.spend(now, time);
+        }
+        is_admitted
     }
 
     /// Pays for a datagram that a connection has taken.
@@ -109,22 +128,33 @@ impl Transport {
     }
 
     fn next_transmit(&mut self, now: Instant, most: usize) -> Option<Datagrams> {
-        if let Some((to, octets)) = self.responses.pop_front() {
-            let segment = None;
-            return Some(Datagrams {
-                to,
-                octets,
-                segment,
-            });
+        if self.responded < RESPONSES_AT_ONCE
+            && let Some(response) = self.next_response()
+        {
+            return Some(response);
         }
         let buffer = &mut self.buffer;
         buffer.clear();
         let mut connections = self.sessions.values_mut().map(|it| &mut it.connection);
-        let transmit = connections.find_map(|it| it.poll_transmit(now, most, buffer))?;
+        let Some(transmit) = connections.find_map(|it| it.poll_transmit(now, most, buffer)) else {
+            self.responded = 0;
+            return self.next_response();
+        };
         Some(Datagrams {
-            to: transmit.destination,
+            to: zone::extract(transmit.destination),
             octets: Bytes::copy_from_slice(&buffer[..transmit.size]),
             segment: transmit.segment_size,
+        })
+    }
+
+    fn next_response(&mut self) -> Option<Datagrams> {
+        let (to, octets) = self.responses.pop_front()?;
+        self.responded += 1;
+        let segment = None;
+        Some(Datagrams {
+            to,
+            octets,
+            segment,
         })
     }
 

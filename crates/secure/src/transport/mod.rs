@@ -13,6 +13,7 @@
 //! Two nodes that dial each other get two connections. Both sides keep the one that the smaller
 //! public key dialled, or else the newer one.
 
+mod admission;
 mod dial;
 mod egress;
 mod inlet;
@@ -24,20 +25,21 @@ mod screen;
 mod session;
 #[cfg(test)]
 mod tests;
+mod tokens;
 mod traffic;
+mod zone;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use jaus::endpoint::{Buckets, Rate, SessionId, quota_address};
+use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
 use jaus::rights::Table;
 use quinn_proto::{
-    ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, Incoming,
-    StreamEvent, VarInt,
+    ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, StreamEvent,
 };
 
 pub use egress::Datagrams;
@@ -50,21 +52,12 @@ use crate::credentials::Credentials;
 use crate::key::{Key, PublicKey};
 use crate::tls::Refusals;
 use crate::trust::TrustFile;
+use admission::{Admission, MOST_RESPONSES};
 use dial::Dial;
 use egress::Budget;
 use session::Session;
+use tokens::Tokens;
 
-/// Limit of unfinished handshakes.
-const MOST_HANDSHAKES: usize = 64;
-/// Limit of unfinished handshakes from one network address.
-const MOST_HANDSHAKES_PER_ADDRESS: usize = 8;
-/// From this number of unfinished handshakes on, a peer must first show that it receives at its
-/// address.
-const RETRY_FROM: usize = 4;
-/// First packets of handshakes from one network address: each costs a key derivation and an answer.
-const FIRST_PACKETS: Rate = Rate::new(50, 100);
-/// Limit of addresses whose first packets are counted. Further ones share one count.
-const MOST_ADDRESSES: usize = 4096;
 /// The shortest interval between warnings about refused peers.
 const WARNING_PAUSE: Duration = Duration::from_secs(10);
 
@@ -74,6 +67,7 @@ mod code {
     pub(super) const DUPLICATE: u32 = 1;
     pub(super) const REVOKED: u32 = 2;
     pub(super) const RENEWED: u32 = 3;
+    pub(super) const BUSY: u32 = 4;
 }
 
 /// The sessions of one node. See the [module](self).
@@ -94,13 +88,17 @@ pub struct Transport {
     reminded: Option<Instant>,
     endpoint: Endpoint,
     client: ClientConfig,
-    first_packets: Buckets<IpAddr>,
+    tokens: Tokens,
+    admission: Admission,
     dials: Vec<Dial>,
     sessions: BTreeMap<SessionId, Session>,
     handles: HashMap<ConnectionHandle, SessionId>,
     next: u64,
     arrivals: VecDeque<Arrival>,
+    /// Answers outside of connections.
     responses: VecDeque<(SocketAddr, Bytes)>,
+    /// How many of them were sent since the connections had their turn.
+    responded: usize,
     records: VecDeque<Record>,
     counters: Counters,
     budget: Option<Budget>,
@@ -126,7 +124,8 @@ impl Transport {
     ) -> Self {
         let refusals = Refusals::default();
         let (own, own_edition) = (credentials.public(), credentials.own_edition());
-        let (server, client) = parameters::of_sides(&credentials, &refusals);
+        let tokens = Tokens::new(&credentials);
+        let (server, client) = parameters::of_sides(&credentials, &refusals, &tokens);
         let config = Arc::new(parameters::of_endpoint(&credentials.own_key()));
         Self {
             own,
@@ -140,13 +139,15 @@ impl Transport {
             reminded: None,
             endpoint: Endpoint::new(config, Some(server), true, None),
             client,
-            first_packets: Buckets::new(FIRST_PACKETS, MOST_ADDRESSES),
+            tokens,
+            admission: Admission::new(),
             dials: dials.into_iter().map(Dial::new).collect(),
             sessions: BTreeMap::new(),
             handles: HashMap::new(),
             next: 0,
             arrivals: VecDeque::new(),
             responses: VecDeque::new(),
+            responded: 0,
             records: VecDeque::new(),
             counters: Counters::default(),
             budget: None,
@@ -174,7 +175,7 @@ impl Transport {
             Some(SessionReport {
                 session: id,
                 peer: peer.clone(),
-                address: session.connection.remote_address(),
+                address: session.address(),
                 dialed: session.dial.is_some(),
                 round_trip: session.connection.rtt(),
                 received: session.received,
@@ -186,18 +187,15 @@ impl Transport {
 
     /// Processes a UDP datagram from this address.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: &[u8]) {
-        if is_first_packet(datagram)
-            && !self.is_dialling(from)
-            && !self.first_packets.take(now, quota_address(from.ip()))
-        {
-            self.counters.add(Counter::HandshakesDropped);
+        if self.is_excess(now, from, datagram) {
+            self.counters.add(Counter::FirstPacketsDropped);
             return;
         }
         self.buffer.clear();
         let data = BytesMut::from(datagram);
-        let event = self
-            .endpoint
-            .handle(now, from, None, None, data, &mut self.buffer);
+        let event =
+            self.endpoint
+                .handle(now, zone::embed(from), None, None, data, &mut self.buffer);
         match event {
             Some(DatagramEvent::ConnectionEvent(handle, event)) => {
                 if let Some(&id) = self.handles.get(&handle)
@@ -208,7 +206,7 @@ impl Transport {
                 }
             }
             Some(DatagramEvent::NewConnection(incoming)) => self.admit(now, incoming),
-            Some(DatagramEvent::Response(response)) => self.respond(&response),
+            Some(DatagramEvent::Response(response)) => self.respond(now, &response),
             None => {}
         }
     }
@@ -264,54 +262,6 @@ impl Transport {
         !running.is_empty()
     }
 
-    /// Decides on a new connection from a peer.
-    fn admit(&mut self, now: Instant, incoming: Incoming) {
-        let from = incoming.remote_address().ip();
-        let (all, near) = self.handshakes(from);
-        if all >= MOST_HANDSHAKES || near >= MOST_HANDSHAKES_PER_ADDRESS {
-            self.counters.add(Counter::HandshakesDropped);
-            self.endpoint.ignore(incoming);
-            return;
-        }
-        self.buffer.clear();
-        if all >= RETRY_FROM && !incoming.remote_address_validated() && incoming.may_retry() {
-            if let Ok(response) = self.endpoint.retry(incoming, &mut self.buffer) {
-                self.respond(&response);
-            }
-            return;
-        }
-        match self.endpoint.accept(incoming, now, &mut self.buffer, None) {
-            Ok((handle, connection)) => {
-                let id = self.insert(Session::new(handle, connection, None));
-                self.advance(now, id);
-            }
-            Err(error) => {
-                self.counters.add(Counter::HandshakesFailed);
-                if let Some(response) = error.response {
-                    self.respond(&response);
-                }
-            }
-        }
-    }
-
-    /// The handshakes of peers that are not finished: all, and those from one network address.
-    fn handshakes(&self, from: IpAddr) -> (usize, usize) {
-        let is_unfinished = |it: &&Session| it.peer.is_none() && !it.ended && it.dial.is_none();
-        let unfinished = self.sessions.values().filter(is_unfinished);
-        let address = |it: &Session| quota_address(it.connection.remote_address().ip());
-        let near = |it: &&Session| address(it) == quota_address(from);
-        (unfinished.clone().count(), unfinished.filter(near).count())
-    }
-
-    /// Whether a handshake of this side with an address is under way.
-    fn is_dialling(&self, address: SocketAddr) -> bool {
-        let mut awaiting = self
-            .sessions
-            .values()
-            .filter(|it| it.is_awaiting_greeting());
-        awaiting.any(|it| it.connection.remote_address() == address)
-    }
-
     fn insert(&mut self, session: Session) -> SessionId {
         let id = SessionId(self.next);
         self.next += 1;
@@ -320,9 +270,14 @@ impl Transport {
         id
     }
 
-    fn respond(&mut self, response: &quinn_proto::Transmit) {
-        let datagram = Bytes::copy_from_slice(&self.buffer[..response.size]);
-        self.responses.push_back((response.destination, datagram));
+    /// Queues the answer in the buffer, if there is room for it.
+    fn respond(&mut self, now: Instant, response: &quinn_proto::Transmit) {
+        let is_affordable = |it: &mut Budget| it.admits_response(now, response.size);
+        if self.responses.len() < MOST_RESPONSES && self.budget.as_mut().is_none_or(is_affordable) {
+            let datagram = Bytes::copy_from_slice(&self.buffer[..response.size]);
+            let to = zone::extract(response.destination);
+            self.responses.push_back((to, datagram));
+        }
     }
 
     /// Processes the events of a connection.
@@ -380,7 +335,7 @@ impl Transport {
             }
         };
         let peer = identified.peer;
-        let (key, address) = (peer.key, session.connection.remote_address());
+        let (key, address) = (peer.key, session.address());
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
         session.valid_until = identified.valid_until;
@@ -434,7 +389,7 @@ impl Transport {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
-        let address = session.connection.remote_address();
+        let address = session.address();
         if let Some(peer) = session.established() {
             tracing::warn!(peer = peer.name, %address, %reason, "secure session lost");
             let reason = reason.to_string();
@@ -468,10 +423,7 @@ impl Transport {
             && !session.ended
         {
             let peer = session.established().map(|it| it.name.clone());
-            let octets = Bytes::from_static(reason.as_bytes());
-            session
-                .connection
-                .close(now, VarInt::from_u32(code), octets);
+            session.close(now, code, reason);
             if let Some(peer) = peer {
                 tracing::info!(peer, reason, "secure session closed");
                 let reason = reason.to_owned();
@@ -496,10 +448,4 @@ impl Transport {
             }
         }
     }
-}
-
-/// Whether a datagram opens a connection: an Initial packet (RFC 9000, section 17.2.2, whatever its
-/// fixed bit: RFC 9287) in a datagram of the least length (section 14.1).
-fn is_first_packet(datagram: &[u8]) -> bool {
-    datagram.len() >= 1200 && datagram[0] & 0xB0 == 0x80
 }

@@ -10,6 +10,7 @@ use quinn_proto::{
 use ring::hmac;
 
 use super::session::STREAMS;
+use super::tokens::Tokens;
 use crate::credentials::Credentials;
 use crate::key::Key;
 use crate::tls::{self, Refusals};
@@ -19,6 +20,9 @@ use crate::tls::{self, Refusals};
 pub(super) const IDLE: Duration = Duration::from_secs(5);
 /// The interval of keep-alives, which also keep a NAT's mapping.
 pub(super) const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// The assumed round trip of a handshake until one was measured: a lost packet is repeated after three
+/// times as long. On slower links a few packets are repeated in vain.
+const INITIAL_ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Octets of QUIC datagrams that may wait in a connection. What exceeds them waits in the backlog of
 /// the session, where an urgent message can overtake it.
 const DATAGRAM_BUFFER: usize = 16 << 10;
@@ -44,6 +48,7 @@ fn transport_config() -> TransportConfig {
         .max_concurrent_bidi_streams(VarInt::from_u32(0))
         .max_idle_timeout(IdleTimeout::try_from(IDLE).ok())
         .keep_alive_interval(Some(KEEP_ALIVE))
+        .initial_rtt(INITIAL_ROUND_TRIP)
         .datagram_send_buffer_size(DATAGRAM_BUFFER);
     config
 }
@@ -52,12 +57,15 @@ fn transport_config() -> TransportConfig {
 pub(super) fn of_sides(
     credentials: &Credentials,
     refusals: &Refusals,
+    tokens: &Tokens,
 ) -> (Arc<ServerConfig>, ClientConfig) {
     let (server, client) = tls::configs(credentials, refusals);
     let transport = Arc::new(transport_config());
     let mut server = ServerConfig::with_crypto(server);
     server.transport_config(transport.clone());
+    tokens.serve(&mut server);
     let mut client = ClientConfig::new(client);
     client.transport_config(transport);
+    tokens.keep(&mut client);
     (Arc::new(server), client)
 }

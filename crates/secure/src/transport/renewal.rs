@@ -20,7 +20,8 @@ impl Transport {
         }
         self.own_edition = edition;
         self.own = self.credentials.public();
-        let (server, client) = parameters::of_sides(&self.credentials, &self.refusals);
+        let (server, client) =
+            parameters::of_sides(&self.credentials, &self.refusals, &self.tokens);
         self.endpoint.set_server_config(Some(server));
         self.client = client;
         tracing::info!(key = %self.own, "the node's key or certificate was replaced");

@@ -22,9 +22,14 @@ jaus::counters! {
     /// the proof of its key.
     RefusedCertificates = "handshakes refused: certificate or proof of its key not valid",
     RefusedUnusableTrust = "handshakes refused: a file of trust cannot be used",
-    /// First packets ignored because too many came from one address, or too many handshakes were
-    /// unfinished.
-    HandshakesDropped = "handshakes refused: too many from one address or unfinished",
+    /// Handshakes ignored because their address, or all addresses together, began too many.
+    HandshakesDropped = "handshakes refused: too many from one address or from all",
+    /// Unfinished handshakes that were ended because there were too many.
+    HandshakesDisplaced = "handshakes refused: others took their place",
+    /// First packets whose sender was asked to prove that it receives at its address.
+    Retries = "first packets answered by a Retry packet",
+    /// First packets dropped unread, because too many arrived at once.
+    FirstPacketsDropped = "handshakes refused: too many first packets",
     ExpiryReminders = "warnings that the own certificate expires",
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.

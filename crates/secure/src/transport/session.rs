@@ -6,16 +6,18 @@
 //! take yet waits in a backlog, most urgent first.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::net::SocketAddr;
 use std::time::Instant;
 
 use bytes::{Buf as _, Bytes};
 use jaus::address::JausId;
 use jaus::link::backlog::{Backlog, Bounds};
 use jaus::wire::{Acknowledgement, DataControl, Priority, judp};
-use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId};
+use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId, VarInt};
 use rustls::pki_types::{CertificateDer, UnixTime};
 
 use super::inlet::{Inlet, framed};
+use super::zone;
 use crate::authority::Rejection;
 use crate::credentials::Identified;
 use crate::trust::Peer;
@@ -122,6 +124,17 @@ impl Session {
             sent: 0,
             turn: 0,
         }
+    }
+
+    /// The address that the peer sends from at present.
+    pub(super) fn address(&self) -> SocketAddr {
+        zone::extract(self.connection.remote_address())
+    }
+
+    /// Closes the connection from this side.
+    pub(super) fn close(&mut self, now: Instant, code: u32, reason: &'static str) {
+        let reason = Bytes::from_static(reason.as_bytes());
+        self.connection.close(now, VarInt::from_u32(code), reason);
     }
 
     /// The peer, while messages can be exchanged with it.

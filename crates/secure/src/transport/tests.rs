@@ -6,6 +6,7 @@
 
 mod beacons;
 mod budget;
+mod floods;
 
 use std::collections::BTreeMap;
 
@@ -415,52 +416,6 @@ fn replayed_and_damaged_packets_have_no_effect() {
     assert_eq!(network.hosts[0].received.len(), 1);
     assert_eq!(network.session(0).unwrap().peer.name, "operator");
     assert_eq!(network.count(0, Counter::SessionsEstablished), 1);
-}
-
-#[test]
-fn a_flood_of_handshakes_from_one_address_is_bounded_and_keeps_no_other_out() {
-    let keys = [key(), key(), key()];
-    let trust = trusting([peer("operator", &keys[1], "60.255.255")]);
-    let mut network = Network::new();
-    network.add(&keys[0], &trust, &[]);
-    let rover = trusting([peer("rover", &keys[0], "101.255.255")]);
-    // Each first packet of a stranger opens a handshake that it never finishes.
-    for _ in 0..500 {
-        let mut stranger = Transport::new(&keys[2], rover.clone(), [address(1)]);
-        stranger.handle_timeout(network.now);
-        while let Some(Datagrams { to, octets, .. }) = stranger.poll_transmit(network.now, 1) {
-            network.deliver(to, address(66), &octets);
-        }
-    }
-    let open = network.hosts[0].transport.sessions.len();
-    assert!(open <= RETRY_FROM, "{open}");
-    network.add(&keys[1], &rover, &[address(1)]);
-    network.run(SECOND);
-    assert_eq!(network.session(0).unwrap().peer.name, "operator");
-}
-
-#[test]
-fn ten_thousand_first_packets_a_second_are_answered_a_hundred_times() {
-    let (mut network, ..) = vehicle_and_operator();
-    let mut stranger = Transport::new(&key(), TrustFile::default(), [address(1)]);
-    stranger.handle_timeout(network.now);
-    let first = stranger.poll_transmit(network.now, 1).unwrap();
-    for number in 0..10_000u32 {
-        // Another destination id makes it another handshake; that it does not decrypt is found last.
-        let mut packet = first.octets.to_vec();
-        // The fixed bit may be 0 (RFC 9287).
-        packet[0] ^= if number % 2 == 0 { 0x40 } else { 0 };
-        packet[6..10].copy_from_slice(&number.to_le_bytes());
-        network.deliver(first.to, address(66), &packet);
-    }
-    let vehicle = &mut network.hosts[0].transport;
-    assert!(vehicle.counters().get(Counter::HandshakesDropped) >= 9_900);
-    assert!(vehicle.responses.len() <= 100);
-    // The operator notices nothing.
-    let command = judp("60.1.1", 20);
-    network.send(1, Priority::Standard, &command);
-    network.run(2 * DELAY);
-    assert_eq!(network.hosts[0].received, [command]);
 }
 
 #[test]

@@ -233,7 +233,7 @@ impl Transport {
         let Some(session) = self.sessions.get(&id) else {
             return;
         };
-        let address = session.connection.remote_address();
+        let address = session.address();
         self.push_record(Record {
             peer: session.peer.as_ref().map(|it| it.name.clone()),
             key: session.peer.as_ref().map(|it| it.key),
