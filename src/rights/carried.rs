@@ -50,11 +50,11 @@ enum Step {
     /// A format, a count of this size, and a message in one of these formats.
     Formatted(usize, Vec<u8>),
     /// A count of this size, and so many elements.
-    List(usize, Vec<Step>),
+    List(usize, Vec<Self>),
     /// A presence vector of this size, and members, some of which are optional.
-    Group(usize, Vec<(bool, Vec<Step>)>),
+    Group(usize, Vec<(bool, Vec<Self>)>),
     /// A tag of this size, and the alternative with that number.
-    Variant(usize, Vec<Vec<Step>>),
+    Variant(usize, Vec<Vec<Self>>),
     /// What the notation does not express.
     Unknown,
 }

@@ -403,5 +403,5 @@ impl fmt::Display for Rules {
     }
 }
 
-#[cfg(all(test, feature = "mobility"))]
+#[cfg(test)]
 mod tests;

@@ -1,3 +1,5 @@
+#![cfg(feature = "mobility")]
+
 use std::collections::BTreeMap;
 
 use bytes::Bytes;

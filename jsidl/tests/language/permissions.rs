@@ -69,8 +69,8 @@ fn a_query_and_a_report_need_nothing_and_every_other_input_says_what_it_needs() 
 
 #[test]
 fn a_message_that_a_client_sends_is_no_report() {
-    let lamp = message("DimLamp", "D001", "", "");
-    let (table, missing) = permissions(&[lamp.clone()], &[lamp]).unwrap();
+    let lamp = [message("DimLamp", "D001", "", "")];
+    let (table, missing) = permissions(&lamp, &lamp).unwrap();
     assert_eq!(table, "service urn:example:Lamp D001\n");
     assert_eq!(missing, ["DimLamp"]);
 }
