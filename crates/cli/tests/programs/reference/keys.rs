@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::source::{Definition, Kind, Shape, Source, Variant};
 
 /// The sources of the settings.
-const FILES: [&str; 19] = [
+const FILES: [&str; 20] = [
     "src/node/config/mod.rs",
     "src/node/config/delivery.rs",
     "src/node/config/tcp.rs",
@@ -20,6 +20,7 @@ const FILES: [&str; 19] = [
     "src/endpoint/egress/mod.rs",
     "src/endpoint/forward.rs",
     "src/endpoint/rate.rs",
+    "crates/stack/limits/src/lib.rs",
     "src/link/group.rs",
     "src/link/interface/choice.rs",
     "src/link/local/address.rs",
