@@ -65,6 +65,7 @@ impl Definitions {
 
 impl Jsidl {
     /// The files and directories.
+    #[cfg(feature = "secure")]
     pub(crate) fn paths(&self) -> &[PathBuf] {
         &self.jsidl
     }
