@@ -55,7 +55,11 @@ fn main() {
 fn permissions() {
     let mut loader = Loader::new();
     loader.catalogue();
-    let permissions = Permissions::of(&loader.load().library);
+    let loaded = loader.load();
+    for error in loaded.diagnostics.errors() {
+        println!("cargo::error={error}");
+    }
+    let permissions = Permissions::of(&loaded.library);
     for message in &permissions.missing {
         let (name, place) = (&message.name, &message.location);
         println!("cargo::error={place}: {name} lacks `own:permission`");

@@ -177,7 +177,7 @@ impl Table {
             Permission::Answer { .. } => Permission::Answer {
                 is_granted: field.flatten() == Some(0),
             },
-            Permission::ClearEmergency if clears_all(message) => Permission::ClearAnyEmergency,
+            Permission::ClearEmergency if may_clear_all(message) => Permission::ClearAnyEmergency,
             needs => needs,
         })
     }
@@ -317,4 +317,10 @@ pub(super) fn code_of(message: &[u8]) -> Option<u16> {
 #[must_use]
 pub fn clears_all(message: &[u8]) -> bool {
     message.get(2..4) == Some(&CLEAR_ALL.to_le_bytes())
+}
+
+/// Whether a Clear Emergency may be for those of all clients: it is, or the rest of its code is in
+/// another fragment.
+fn may_clear_all(message: &[u8]) -> bool {
+    message.len() < 4 || clears_all(message)
 }

@@ -98,6 +98,29 @@ fn each_further_right_has_its_word() {
     );
 }
 
+/// What decides may be cut off, and follow in another fragment.
+#[test]
+fn a_fragment_without_what_decides_needs_the_greatest_right() {
+    let fragment = |octets: &'static [u8]| Frame {
+        flags: Flags::default().with_data(DataControl::First),
+        ..frame(octets)
+    };
+    let check = |rules: &str, octets| {
+        let rules = rules.parse::<Rules>().unwrap();
+        rules.check(&fragment(octets), &Table::default())
+    };
+    for cut in [&b"\x07\x00"[..], b"\x07\x00\xFF"] {
+        let refused = Err(Refusal::ClearAnyEmergency);
+        assert_eq!(check("clear-emergency", cut), refused);
+        assert_eq!(check("clear-emergency=any", cut), Ok(()));
+    }
+    assert_eq!(check("clear-emergency", b"\x07\x00\x01\x00"), Ok(()));
+    for cut in [&b"\x0D\x00"[..], b"\x31\xFF", b"\x01\x00"] {
+        assert!(check("control=254", cut).is_err());
+        assert_eq!(check("control=255", cut), Ok(()));
+    }
+}
+
 #[test]
 fn only_and_except_select_by_service_message_and_code() {
     let wrench = SetWrenchEffort::default();

@@ -30,8 +30,8 @@ async def drive(node: jaus.Node, how: str) -> None:
     print("drives")
     if how == "sleep":
         time.sleep(3600)
-    if how != "leave":
-        await asyncio.sleep(3600)
+    # What has arrived may still wait there, and the release would overtake it.
+    await asyncio.sleep(0.2 if how == "leave" else 3600)
 
 
 if __name__ == "__main__":

@@ -22,8 +22,8 @@
 //! | `configure` | shuts a component down, or changes its set-up |
 //!
 //! A message that a service receives needs the attribute, unless it is marked as a query: no command,
-//! and answered by a report of the same service. What a service only sends is a report. Nothing is
-//! guessed: the message has no permission otherwise, and a node refuses it.
+//! and answered by a report of the same service. What a service only sends is a report, unless it is a
+//! command. Nothing is guessed: the message has no permission otherwise, and a node refuses it.
 //!
 //! Where several services give one code to different messages, the greatest right is needed: a node
 //! cannot tell which of them is meant.
@@ -148,9 +148,12 @@ impl Permissions {
         }
         for message in library.services().flat_map(|service| &service.outputs) {
             // A client sends commands, too: those that a service receives are judged there.
-            let is_received = missing.contains(&key(message));
+            let is_report = !message.is_command && !missing.contains(&key(message));
             let needs = stated.get(&key(message)).cloned();
-            let needs = needs.or_else(|| (!is_received).then_some(Permission::Observe));
+            let needs = needs.or_else(|| is_report.then_some(Permission::Observe));
+            if needs.is_none() && missing.insert(key(message)) {
+                found.missing.push(message.clone());
+            }
             if let Some(needs) = needs {
                 found.add(message, needs, false);
             }

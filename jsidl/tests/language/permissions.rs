@@ -73,6 +73,11 @@ fn a_message_that_a_client_sends_is_no_report() {
     let (table, missing) = permissions(&lamp, &lamp).unwrap();
     assert_eq!(table, "service urn:example:Lamp D001\n");
     assert_eq!(missing, ["DimLamp"]);
+    // The definition of a client alone.
+    let lamp = [message("DimLamp", "D001", r#"is_command="true""#, "")];
+    let (table, missing) = permissions(&[], &lamp).unwrap();
+    assert_eq!(table, "service urn:example:Lamp \n");
+    assert_eq!(missing, ["DimLamp"]);
 }
 
 #[test]
