@@ -208,6 +208,8 @@ export class GamepadSource {
 
   /** The gamepads as read at `time`. Returns whether there is a new act: a shoulder button was pressed. */
   handlePads(pads, time) {
+    // What was pressed while the page stood still may be released since.
+    if (this.#readAt + UNREAD <= time) this.#rested.clear();
     this.#readAt = time;
     const present = pads.filter((pad) => pad?.connected);
     const own = present.find((pad) => pad.index === this.#index);

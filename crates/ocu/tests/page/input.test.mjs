@@ -296,6 +296,18 @@ test("a gamepad that is not read any more stops", () => {
   assert.equal(bench.owner, null);
 });
 
+test("a shoulder button that was pressed while the page stood still drives nothing", () => {
+  const bench = new Bench();
+  bench.pad({ isHeld: false });
+  bench.pass(300);
+  bench.pad();
+  assert.equal(bench.owner, null);
+  bench.pad({ isHeld: false });
+  bench.pass(280);
+  bench.pad();
+  assert.equal(bench.owner, "Gamepad");
+});
+
 test("a gamepad that is gone stops, and comes back at rest", () => {
   const bench = new Bench();
   bench.pad({ isHeld: false });
