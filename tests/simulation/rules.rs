@@ -8,8 +8,8 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
-    ClearEmergency, ConfirmControl, DeleteElement, RejectControl, RequestControl, Reset, Resume,
-    SetEmergency, Standby, confirm_control, reject_control,
+    ClearEmergency, ConfirmControl, DeleteElement, RejectControl, ReleaseControl, RequestControl,
+    Reset, Resume, SetEmergency, Standby, confirm_control, reject_control,
 };
 use jaus::service::{Standing, State};
 
@@ -25,6 +25,11 @@ pub(crate) struct Rules {
     /// Emergencies of others that a client has cleared that has restarted since it got control. The
     /// vehicle may take it for one that is not in control.
     perhaps_cleared: BTreeMap<JausId, Numbered>,
+    /// The last request for control of each client.
+    requests: BTreeMap<JausId, Numbered>,
+    /// The last message of each client by which it stopped the vehicle, or took it up: what it has
+    /// sent before that moves nothing.
+    turns: BTreeMap<JausId, Numbered>,
     /// When each client last sent a message: the client in control may clear the emergency of a
     /// client that is silent for long.
     heard: BTreeMap<JausId, Instant>,
@@ -72,6 +77,17 @@ impl Numbered {
 /// No message is on its way for longer.
 const LATEST: Duration = Duration::from_secs(2);
 
+/// Whether messages with this code stop the vehicle.
+fn is_stop(code: Option<u16>) -> bool {
+    let stops = [
+        ReleaseControl::CODE,
+        Standby::CODE,
+        Reset::CODE,
+        SetEmergency::CODE,
+    ];
+    code.is_some_and(|code| stops.contains(&code))
+}
+
 /// The message code at the head of a payload.
 fn code_of(payload: &[u8]) -> Option<u16> {
     payload.first_chunk().map(|&code| u16::from_le_bytes(code))
@@ -88,6 +104,8 @@ impl Rules {
             asked: now,
             emergencies: BTreeMap::new(),
             perhaps_cleared: BTreeMap::new(),
+            requests: BTreeMap::new(),
+            turns: BTreeMap::new(),
             heard: BTreeMap::new(),
             resumed: false,
             restarted: BTreeMap::new(),
@@ -99,25 +117,31 @@ impl Rules {
     /// Notes that a client has restarted.
     pub(crate) fn restart(&mut self, now: Instant, client: JausId) {
         self.restarted.insert(client, now);
+        // It may count anew.
+        self.turns.remove(&client);
     }
 
     /// Processes a message that the vehicle is about to receive.
     pub(crate) fn hear(&mut self, now: Instant, message: &Received) {
         let client = message.source;
         self.heard.insert(client, now);
+        let sent = Numbered::of(now, message);
         let commands = self.told == Some(client) && self.emergencies.is_empty();
-        match code_of(&message.payload) {
+        let code = code_of(&message.payload);
+        if self.told == Some(client) && is_stop(code) {
+            self.turn(client, sent);
+        }
+        match code {
             Some(SetEmergency::CODE) => {
-                let set = Numbered::of(now, message);
-                let newest = self.emergencies.entry(client).or_insert(set);
-                if !set.is_before(*newest) {
-                    *newest = set;
+                let newest = self.emergencies.entry(client).or_insert(sent);
+                if !sent.is_before(*newest) {
+                    *newest = sent;
                 }
                 self.resumed = false;
             }
             // It arrives late: its client has set the emergency again since, or has restarted and
             // counts anew.
-            Some(ClearEmergency::CODE) if self.has_since(Numbered::of(now, message), client) => {}
+            Some(ClearEmergency::CODE) if self.has_since(sent, client) => {}
             Some(ClearEmergency::CODE) => {
                 let mut is_cleared = self.emergencies.remove(&client).is_some();
                 if self.told == Some(client) {
@@ -136,11 +160,33 @@ impl Rules {
                     self.asked = now;
                 }
             }
-            Some(Resume::CODE) if commands => self.resumed = true,
+            Some(Resume::CODE) if commands => {
+                if !self.resumed {
+                    self.turn(client, sent);
+                }
+                self.resumed = true;
+            }
             Some(Standby::CODE | Reset::CODE) if commands => self.resumed = false,
-            Some(RequestControl::CODE) if commands => self.asked = now,
-            Some(Self::COMMAND) if commands && self.resumed => self.acts_for.push(client),
+            Some(RequestControl::CODE) => {
+                self.requests.insert(client, sent);
+                if commands {
+                    self.asked = now;
+                }
+            }
+            Some(Self::COMMAND) if commands && self.resumed => {
+                let turn = self.turns.get(&client);
+                if turn.is_none_or(|turn| !sent.is_before(*turn)) {
+                    self.acts_for.push(client);
+                }
+            }
             _ => {}
+        }
+    }
+
+    fn turn(&mut self, client: JausId, sent: Numbered) {
+        let newest = self.turns.entry(client).or_insert(sent);
+        if !sent.is_before(*newest) {
+            *newest = sent;
         }
     }
 
@@ -167,6 +213,10 @@ impl Rules {
             }
             if let Some(told) = self.told.filter(|&told| told != client) {
                 return Err(format!("{told} and {client} are both in control"));
+            }
+            let has_begun = self.told != Some(client);
+            if let Some(&request) = self.requests.get(&client).filter(|_| has_begun) {
+                self.turn(client, request);
             }
             if self.told.replace(client).is_none() {
                 // Its request may still be one of before.
