@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::codec::Message as _;
 use jaus::messages::mobility::SetTravelSpeed;
+use jaus::rights::Table;
 use jaus::wire::{DataControl, judp};
 use jaus_secure::beacon::{Counter, LENGTH, Neighbors, Received};
 use jaus_secure::transport::{Inlet, framed};
@@ -99,7 +100,7 @@ fn datagram(octets: &[u8]) {
             node => node == (102, 1),
         };
         assert_eq!(PEER.speaks_for(source), is_component && is_own, "{source}");
-        if PEER.rules.check(&frame).is_ok() {
+        if PEER.rules.check(&frame, &Table::default()).is_ok() {
             assert!(
                 matches!(frame.destination.subsystem(), 60 | 65535),
                 "{frame:?}"
