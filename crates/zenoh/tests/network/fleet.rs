@@ -11,6 +11,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Kind, Priority};
 use jaus::messages::mobility::QueryWrenchEffort;
 use jaus::node::{Config, Node};
+use jaus::rights::Acceptance;
 use jaus::service::Timing;
 use jaus_test_kit::figures::Figures;
 use jaus_vehicle::parts::{Part, Slot};
