@@ -49,7 +49,7 @@ impl FromStr for Grant {
 }
 
 /// Reads an id with wildcards, or the number of a subsystem for all of its components.
-pub fn one_or_more(text: &str) -> Option<JausId> {
+fn one_or_more(text: &str) -> Option<JausId> {
     let subsystem = text.parse().ok();
     let all_of = |subsystem| JausId::new(subsystem, JausId::ANY_NODE, JausId::ANY_COMPONENT);
     let ids = subsystem.map_or_else(|| text.parse().ok(), |it| Some(all_of(it)))?;
@@ -67,7 +67,7 @@ impl fmt::Display for Grant {
 pub struct Acceptance(Vec<Grant>);
 
 /// The most grants.
-pub const MOST_GRANTS: usize = 256;
+const MOST_GRANTS: usize = 256;
 
 impl Default for Acceptance {
     /// All ids, which may observe, but set no emergency: nobody has named them.

@@ -1,8 +1,8 @@
 //! What a sender may do: one table of what each message needs, and the rules of each sender.
 //!
-//! Every way into a node asks the same question: secure links for each key, bridges for each id, plain
-//! links for each network (`[access]`). [`Table`] answers what a message needs: the definitions state
-//! it, whatever sets of messages a program was built with. [`Rules`] are what a sender has:
+//! Secure links ask for each key, the bridge to zenoh and plain links (`grants` in `[access]`) for each
+//! id. [`Table`] answers what a message needs: the definitions state it, whatever sets of messages a
+//! program was built with. [`Rules`] are what a sender has:
 //!
 //! | word | the sender may |
 //! |---|---|
@@ -35,8 +35,10 @@ mod table;
 use std::fmt;
 use std::str::FromStr;
 
-pub use accept::{Acceptance, Grant, GrantError, MOST_GRANTS, Unaccepted, one_or_more};
 use bytes::Bytes;
+
+pub(crate) use accept::check as check_by_grants;
+pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 
@@ -44,7 +46,6 @@ use crate::address::JausId;
 use crate::codec::Message as _;
 use crate::messages::core::{ConfirmControl, SetEmergency, confirm_control::ResponseCode};
 use crate::wire::{DataControl, EncodeError, Frame, judp};
-pub(crate) use accept::check as check_by_grants;
 use carried::Carried;
 
 /// What a sender may do. The default is to observe.

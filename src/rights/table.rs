@@ -192,22 +192,22 @@ impl Table {
     /// control, an emergency or the configuration of a component.
     #[must_use]
     pub fn is_recorded(&self, message: &[u8]) -> bool {
-        let mut waiting = vec![(message, 0)];
-        while let Some((message, depth)) = waiting.pop() {
-            if self
-                .permission(message)
-                .is_some_and(Permission::is_recorded)
-            {
-                return true;
-            }
-            match self.carried(message) {
-                Carried::Messages(carried) if depth < carried::DEEPEST => {
-                    waiting.extend(carried.into_iter().map(|it| (it, depth + 1)));
-                }
-                _ => {}
-            }
+        self.is_recorded_within(message, carried::DEEPEST)
+    }
+
+    fn is_recorded_within(&self, message: &[u8], depth: usize) -> bool {
+        if self
+            .permission(message)
+            .is_some_and(Permission::is_recorded)
+        {
+            return true;
         }
-        false
+        match self.carried(message) {
+            Carried::Messages(carried) if depth > 0 => carried
+                .into_iter()
+                .any(|message| self.is_recorded_within(message, depth - 1)),
+            _ => false,
+        }
     }
 
     /// The name of a message for people, or its code.

@@ -340,7 +340,7 @@ fn the_elements_of_a_list_and_the_messages_of_a_mission_are_asked_in_turn() {
         // One inside the other, deeper than any that is of use.
         let nested = (0..20).fold(speed.to_vec(), |inner, _| carrier(&inner));
         assert_eq!(check("command", &nested), Err(Refusal::Hidden));
-        // Whatever is cut off, or has a count that is too great.
+        // A message that ends too early is refused.
         let whole = carrier(&speed);
         let everything = Rules::everything();
         for end in 2..whole.len() - 3 {

@@ -60,7 +60,7 @@ fn mark(path: &std::path::Path) -> Mark {
     use std::{thread, time::Duration};
 
     /// How often a lock is tried: the check of [`FormerContent`](crate::FormerContent) holds one for an
-    /// instant, anybody else may do so for ever.
+    /// instant; another program could hold one for good.
     const ATTEMPTS: u32 = 5;
     const PAUSE: Duration = Duration::from_millis(1);
 
