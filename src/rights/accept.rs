@@ -80,7 +80,7 @@ impl Default for Acceptance {
 }
 
 /// Why a message is not accepted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, thiserror::Error)]
 pub enum Unaccepted {
     /// Its source is in no grant.
     #[error("its source is not accepted")]

@@ -29,23 +29,23 @@
 
 mod accept;
 mod carried;
+mod decision;
 mod selection;
 mod table;
 
 use std::fmt;
 use std::str::FromStr;
 
-use bytes::Bytes;
-
 pub(crate) use accept::check as check_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
+pub use decision::{Decision, Verdict, denial};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 
 use crate::address::JausId;
 use crate::codec::Message as _;
-use crate::messages::core::{ConfirmControl, SetEmergency, confirm_control::ResponseCode};
-use crate::wire::{DataControl, EncodeError, Frame, judp};
+use crate::messages::core::SetEmergency;
+use crate::wire::{DataControl, Frame};
 use carried::Carried;
 
 /// What a sender may do. The default is to observe.
@@ -270,19 +270,6 @@ fn repeats_code(frame: &Frame) -> bool {
 #[must_use]
 pub fn is_recorded(frame: &Frame, table: &Table) -> bool {
     !is_later(frame) && !frame.is_acknowledgement() && table.is_recorded(&frame.payload)
-}
-
-/// The answer to a refused request for control: a datagram with Confirm Control, as from the
-/// component.
-///
-/// # Errors
-/// The header cannot carry it.
-pub fn denial_of_control(request: &Frame) -> Result<Bytes, EncodeError> {
-    let confirm = ConfirmControl {
-        response_code: ResponseCode::INSUFFICIENT_AUTHORITY,
-    };
-    let payload = confirm.encode().unwrap_or_default();
-    judp::encode(&Frame::new(request.destination, request.source, payload))
 }
 
 /// Why a word is no rule.

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::time::SystemTime;
 
+use jaus::rights::{Decision, Verdict};
 use serde::{Serialize, Serializer};
 
 /// How an action ended.
@@ -69,6 +70,29 @@ impl Entry {
             address: None,
             key: None,
             times: 1,
+        }
+    }
+
+    /// The entry of a decision. `who` is the name of the key, user or network of the client: the sender
+    /// of the message, or the one that a component tells something about its control.
+    pub fn of(who: impl Display, decision: &Decision) -> Self {
+        let (source, destination) = (decision.source, decision.destination);
+        let by_client = |result| {
+            let entry = Self::new(&who, &decision.what, result);
+            entry.id(source).to(destination)
+        };
+        let by_component = |what, result| {
+            let why = format_args!("the component's answer: {}", decision.what);
+            let entry = Self::new(&who, what, result);
+            entry.id(destination).to(source).because(why)
+        };
+        match decision.verdict {
+            Verdict::Refused(why) => by_client(Outcome::Refused).because(why),
+            Verdict::Granted => by_component("control", Outcome::Allowed),
+            Verdict::Denied => by_component("control", Outcome::Refused),
+            Verdict::Ended => by_component("end of control", Outcome::Allowed),
+            // It was passed on.
+            _ => by_client(Outcome::Allowed),
         }
     }
 

@@ -12,8 +12,8 @@ use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::endpoint::{Remote, To, Transmit};
 use jaus::link::custom::Arrival;
-use jaus::messages::core::{QueryIdentification, RequestControl};
-use jaus::rights::{Acceptance, Refusal, Table, Unaccepted, denial_of_control};
+use jaus::messages::core::QueryIdentification;
+use jaus::rights::{Acceptance, Refusal, Table, Unaccepted, denial};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
 
 use crate::counters::{Counter, Counters};
@@ -236,9 +236,7 @@ impl Exchange {
             let reason = reason(refusal);
             tracing::warn!("{code:04X}h from {source} to {destination} refused: {reason}");
         }
-        if code == RequestControl::CODE
-            && let Ok(denial) = denial_of_control(frame)
-            && let Some(denial) = only_frame(&denial)
+        if let Some(denial) = denial(frame)
             && self.locals.contains_key(&denial.source)
         {
             self.publish(now, &denial, None, Recipient::Bridge(from));

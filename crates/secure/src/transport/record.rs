@@ -2,12 +2,11 @@
 
 use std::net::SocketAddr;
 
-use jaus::address::JausId;
+use jaus::rights::Decision;
 use quinn_proto::ConnectionError;
 
 use crate::authority::Rejection;
 use crate::key::PublicKey;
-use jaus::rights::Refusal;
 
 /// Something worth an entry in an audit log.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,48 +35,18 @@ pub enum Act {
     },
     /// No session was established.
     HandshakeFailed(Fault),
-    /// A message came from an id for which the key may not speak.
-    ForeignId {
-        /// The id.
-        source: JausId,
-        /// The destination.
-        destination: JausId,
-    },
-    /// A message was refused; or it concerns control, an emergency or the configuration of a
-    /// component, and was passed to it.
-    Message {
-        /// Its name, or its code.
-        name: String,
-        /// The sender.
-        source: JausId,
-        /// The destination.
-        destination: JausId,
-        /// The rule that forbids it, if it was refused.
-        refusal: Option<Refusal>,
-    },
-    /// A component answered the peer's request for control.
-    Control {
-        /// The component.
-        component: JausId,
-        /// The peer's id.
-        client: JausId,
-        /// Whether it has control.
-        is_granted: bool,
-    },
+    /// A rule decided about a message of the peer, or a component about its control.
+    Decided(Decision),
 }
 
 impl Act {
     /// Whether something was refused.
     pub(super) const fn is_refusal(&self) -> bool {
-        matches!(
-            self,
-            Self::HandshakeFailed(_)
-                | Self::ForeignId { .. }
-                | Self::Message {
-                    refusal: Some(_),
-                    ..
-                }
-        )
+        match self {
+            Self::HandshakeFailed(_) => true,
+            Self::Decided(decision) => decision.is_refusal(),
+            Self::Connected | Self::Disconnected { .. } => false,
+        }
     }
 }
 

@@ -2,42 +2,33 @@
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::rights::{Refusal, Table};
+use jaus::rights::{Table, Unaccepted};
 use jaus::wire::{Frame, judp};
 
 use crate::trust::Peer;
-
-/// Why a frame does not pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stop {
-    /// The key may not speak for its source.
-    ForeignId,
-    /// A rule of the key forbids it.
-    Rule(Refusal),
-}
 
 /// The octets of a datagram that pass, and each frame with the decision on it.
 #[derive(Debug)]
 pub(super) struct Screened {
     /// The datagram as it was if all frames pass; without the others if some do; `None` if none.
     pub(super) passed: Option<Bytes>,
-    pub(super) frames: Vec<(Frame, Result<(), Stop>)>,
+    pub(super) frames: Vec<(Frame, Result<(), Unaccepted>)>,
 }
 
 /// Screens a datagram from a peer; `None` if it is no JUDP.
 pub(super) fn incoming(peer: &Peer, table: &Table, octets: &Bytes) -> Option<Screened> {
     screen(octets, |frame| {
         if !peer.speaks_for(frame.source) {
-            return Err(Stop::ForeignId);
+            return Err(Unaccepted::Source);
         }
-        peer.rules.check(frame, table).map_err(Stop::Rule)
+        peer.rules.check(frame, table).map_err(Unaccepted::Rule)
     })
 }
 
 /// Screens a datagram with this check; `None` if it is no JUDP.
 pub(super) fn screen(
     octets: &Bytes,
-    check: impl Fn(&Frame) -> Result<(), Stop>,
+    check: impl Fn(&Frame) -> Result<(), Unaccepted>,
 ) -> Option<Screened> {
     let mut following = judp::frames(octets.clone()).ok()?;
     let first = octets.len() - following.remaining();
@@ -65,17 +56,6 @@ pub(super) fn screen(
         Some(passed.freeze())
     };
     Some(Screened { passed, frames })
-}
-
-/// One frame of a message that was refused, in words for the peer and the log.
-pub(super) fn sentence(frame: &Frame, table: &Table, refusal: Refusal) -> String {
-    let Frame {
-        source,
-        destination,
-        ..
-    } = frame;
-    let name = table.name_of(&frame.payload);
-    format!("{name} from {source} to {destination}: {refusal}")
 }
 
 /// Whether a path between two peers is open: neither may be closed to the other.

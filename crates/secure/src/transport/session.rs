@@ -5,12 +5,11 @@
 //! message does not hold up an urgent one. QUIC's congestion control sets the pace; what it does not
 //! take yet waits in a backlog, most urgent first.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::Instant;
 
 use bytes::{Buf as _, Bytes};
-use jaus::address::JausId;
 use jaus::link::backlog::{Backlog, Bounds};
 use jaus::wire::{Acknowledgement, DataControl, Priority, judp};
 use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId, VarInt};
@@ -27,8 +26,6 @@ const WAITING: Bounds = Bounds {
     items: 8192,
     octets: 4 << 20,
 };
-/// Unanswered requests for control that a session remembers.
-const MOST_REQUESTS: usize = 64;
 /// Octets to read from a stream at once.
 const CHUNK: usize = 64 << 10;
 /// Streams that a peer may open: one for each priority.
@@ -50,8 +47,6 @@ pub(super) struct Session {
     pub(super) noticed: Option<Instant>,
     /// When the peer's notice about a refused message was last logged.
     pub(super) heard: Option<Instant>,
-    /// The peer's requests for control that no component has answered yet.
-    pub(super) requests: Requests,
     backlog: Backlog<(Priority, Bytes)>,
     outlets: [Outlet; Priority::ALL.len()],
     inlets: BTreeMap<StreamId, Inlet>,
@@ -69,38 +64,6 @@ struct Outlet {
     leaving: Bytes,
 }
 
-/// Requests for control: the component and the client of each.
-#[derive(Debug, Default)]
-pub(super) struct Requests(VecDeque<(JausId, JausId)>);
-
-impl Requests {
-    /// Adds a request; the oldest goes if there are too many.
-    pub(super) fn add(&mut self, component: JausId, client: JausId) {
-        if self.0.contains(&(component, client)) {
-            return;
-        }
-        if self.0.len() == MOST_REQUESTS {
-            self.0.pop_front();
-        }
-        self.0.push_back((component, client));
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// Whether there is a request that a component answers. It stays until it is granted: a handover may
-    /// be put off first.
-    pub(super) fn answer(&mut self, component: JausId, client: JausId, is_granted: bool) -> bool {
-        let answers = |it: &(JausId, JausId)| it.1 == client && it.0.overlaps(component);
-        let found = self.0.iter().position(answers);
-        if let Some(index) = found.filter(|_| is_granted) {
-            self.0.remove(index);
-        }
-        found.is_some()
-    }
-}
-
 impl Session {
     pub(super) fn new(
         handle: ConnectionHandle,
@@ -116,7 +79,6 @@ impl Session {
             ended: false,
             noticed: None,
             heard: None,
-            requests: Requests::default(),
             backlog: Backlog::new(WAITING),
             outlets: Default::default(),
             inlets: BTreeMap::new(),

@@ -3,16 +3,14 @@
 use std::time::{Duration, Instant};
 
 use bytes::{BufMut as _, Bytes, BytesMut};
-use jaus::codec::Message as _;
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::messages::core::RequestControl;
-use jaus::rights::{Permission, denial_of_control, is_recorded};
+use jaus::rights::{Decision, Unaccepted, denial};
 use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
 use super::record::{Act, Record};
-use super::screen::{self, Stop};
+use super::screen;
 use super::session::Session;
 use super::{Counter, Transport};
 use crate::trust::Peer;
@@ -70,34 +68,21 @@ impl Transport {
                 screen::may_pass(frame.source, &origins, to)
             };
             let passes = is_addressed && (!has_limits || is_open());
-            passes.then_some(()).ok_or(Stop::ForeignId)
+            passes.then_some(()).ok_or(Unaccepted::Source)
         })?;
         let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
         self.counters.add_many(Counter::Separated, stopped as u64);
         screened.passed
     }
 
-    /// Records the answers of components to the peer's requests for control.
+    /// Records what components tell the peer about its control.
     fn record_answers(&mut self, id: SessionId, datagram: &Bytes) {
-        let asks_nothing = |it: &Session| it.requests.is_empty();
-        if self.sessions.get(&id).is_none_or(asks_nothing) {
-            return;
-        }
         let Ok(frames) = judp::frames(datagram.clone()) else {
             return;
         };
         for frame in frames.map_while(Result::ok) {
-            let (component, client) = (frame.source, frame.destination);
-            if let Some(Permission::Answer { is_granted }) = self.table.permission(&frame.payload)
-                && let Some(session) = self.sessions.get_mut(&id)
-                && session.requests.answer(component, client, is_granted)
-            {
-                let act = Act::Control {
-                    component,
-                    client,
-                    is_granted,
-                };
-                self.record(id, act);
+            if let Some(told) = Decision::told_by(&frame, &self.table) {
+                self.record(id, Act::Decided(told));
             }
         }
     }
@@ -150,8 +135,8 @@ impl Transport {
             return;
         };
         session.received += 1;
-        for (frame, decision) in &screened.frames {
-            self.handle_decision(now, id, frame, *decision);
+        for (frame, checked) in &screened.frames {
+            self.handle_decision(now, id, frame, *checked);
         }
         if let Some(octets) = screened.passed {
             let session = id;
@@ -160,66 +145,46 @@ impl Transport {
         }
     }
 
+    /// Records the decision on a frame of the peer; of a refused one, tells the peer.
     fn handle_decision(
         &mut self,
         now: Instant,
         id: SessionId,
         frame: &Frame,
-        decision: Result<(), Stop>,
+        checked: Result<(), Unaccepted>,
     ) {
-        let (source, destination) = (frame.source, frame.destination);
-        let table = self.table.clone();
-        let message = |refusal| Act::Message {
-            name: table.name_of(&frame.payload),
-            source,
-            destination,
-            refusal,
+        let Some(decision) = Decision::of(frame, checked, &self.table) else {
+            return;
         };
-        match decision {
-            Ok(()) if is_recorded(frame, &table) => {
-                if let Some(Permission::Control { .. }) = table.permission(&frame.payload)
-                    && let Some(session) = self.sessions.get_mut(&id)
-                {
-                    session.requests.add(destination, source);
-                }
-                self.record(id, message(None));
-            }
+        match checked {
             Ok(()) => {}
-            Err(Stop::ForeignId) => {
-                self.counters.add(Counter::ForeignIds);
-                self.record(
-                    id,
-                    Act::ForeignId {
-                        source,
-                        destination,
-                    },
-                );
-            }
-            Err(Stop::Rule(refusal)) => {
+            // Of a peer that speaks for others, nobody can be answered.
+            Err(Unaccepted::Source) => self.counters.add(Counter::ForeignIds),
+            Err(Unaccepted::Rule(_)) => {
                 self.counters.add(Counter::RuleForbids);
-                self.record(id, message(Some(refusal)));
-                self.answer_refusal(now, id, frame, &screen::sentence(frame, &table, refusal));
+                self.answer_refusal(now, id, frame, &decision);
             }
         }
+        self.record(id, Act::Decided(decision));
     }
 
     /// Tells the peer what was refused: in the words of JAUS if it asked for control, and in a
     /// notice.
-    fn answer_refusal(&mut self, now: Instant, id: SessionId, frame: &Frame, sentence: &str) {
+    fn answer_refusal(&mut self, now: Instant, id: SessionId, frame: &Frame, decision: &Decision) {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
         let mut dropped = 0;
-        if frame.code() == Some(RequestControl::CODE)
-            && frame.destination.is_unicast()
-            && let Ok(denial) = denial_of_control(frame)
+        if let Some(denial) = denial(frame)
+            && let Ok(denial) = judp::encode(&denial)
         {
             dropped += session.queue(frame.flags.priority(), denial);
         }
         if session.noticed.is_none_or(|at| now >= at + NOTICE_PAUSE) {
             session.noticed = Some(now);
             let name = session.established().map_or("", |it| &it.name);
-            tracing::warn!(peer = name, "refused {sentence}");
+            tracing::warn!(peer = name, "refused {decision}");
+            let sentence = decision.to_string();
             let mut notice = BytesMut::new();
             notice.put_u8(NOTICE);
             notice.put_slice(&sentence.as_bytes()[..sentence.len().min(LONGEST_NOTICE)]);

@@ -1,8 +1,9 @@
 //! What a key may do, and what one peer learns of another.
 
 use jaus::codec::Message as _;
-use jaus::messages::core::{ConfirmControl, RequestControl, SetEmergency};
+use jaus::messages::core::{ConfirmControl, RejectControl, RequestControl, SetEmergency};
 use jaus::messages::mobility::{QueryVelocityState, SetWrenchEffort};
+use jaus::rights::{Decision, Refusal, Unaccepted, Verdict};
 
 use super::*;
 
@@ -35,6 +36,15 @@ fn records(network: &mut Network, host: usize) -> Vec<Act> {
         .collect()
 }
 
+fn decisions(network: &mut Network, host: usize) -> Vec<Decision> {
+    let decided = |act| match act {
+        Act::Decided(decision) => Some(decision),
+        _ => None,
+    };
+    let records = records(network, host);
+    records.into_iter().filter_map(decided).collect()
+}
+
 #[test]
 fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
     let (mut network, ..) = vehicle_with_rules("");
@@ -51,14 +61,9 @@ fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
         1,
         "one a second"
     );
-    let refused = |act: &Act| matches!(act, Act::Message { name, refusal: Some(_), .. } if name == "SetWrenchEffort");
-    assert_eq!(
-        records(&mut network, 0)
-            .iter()
-            .filter(|it| refused(it))
-            .count(),
-        2
-    );
+    let recorded = decisions(&mut network, 0);
+    let refused = |it: &&Decision| it.is_refusal() && it.what == "SetWrenchEffort";
+    assert_eq!(recorded.iter().filter(refused).count(), 2);
 }
 
 #[test]
@@ -128,25 +133,17 @@ fn control_emergencies_and_sessions_are_recorded() {
     );
     network.run(SECOND);
     let acts = records(&mut network, 0);
-    let names: Vec<_> = acts
-        .iter()
-        .map(|act| match act {
-            Act::Connected => "connected",
-            Act::Message {
-                name,
-                refusal: None,
-                ..
-            } => name,
-            Act::Control {
-                is_granted: true, ..
-            } => "granted",
-            _ => "other",
-        })
-        .collect();
-    assert_eq!(
-        names,
-        ["connected", "RequestControl", "SetEmergency", "granted"]
-    );
+    assert_eq!(acts[0], Act::Connected);
+    let decided = acts.iter().filter_map(|act| match act {
+        Act::Decided(it) => Some((&*it.what, it.verdict)),
+        _ => None,
+    });
+    let expected = [
+        ("RequestControl", Verdict::Passed),
+        ("SetEmergency", Verdict::Passed),
+        ("ConfirmControl", Verdict::Granted),
+    ];
+    assert_eq!(decided.collect::<Vec<_>>(), expected);
 }
 
 /// A relay with two vehicles, 101 and 102, and two operators, 61 and 62; each operator has one
@@ -236,14 +233,30 @@ fn a_message_goes_only_to_the_session_of_its_destination() {
     assert_eq!(network.hosts[4].received, [query]);
 }
 
+/// However many requests are open: none of them keeps the answer to another out of the log.
 #[test]
-fn only_the_answer_to_a_request_is_recorded_as_control() {
+fn each_answer_about_control_and_its_loss_are_recorded() {
     let (mut network, ..) = vehicle_with_rules("control=127");
-    let confirm = message("101.1.1", "60.1.1", &ConfirmControl::default());
-    network.send(0, Priority::Standard, &confirm);
+    for component in 1..=200 {
+        let to = format!("101.1.{component}");
+        let request = RequestControl { authority_code: 1 };
+        network.send(1, Priority::Standard, &message("60.1.1", &to, &request));
+    }
     network.run(SECOND);
-    let is_control = |act: &Act| matches!(act, Act::Control { .. });
-    assert!(!records(&mut network, 0).iter().any(is_control));
+    let told: [Bytes; 3] = [
+        message("101.1.1", "60.1.1", &ConfirmControl::default()),
+        message("101.1.1", "60.1.1", &RejectControl::default()),
+        message("101.1.200", "60.1.1", &ConfirmControl::default()),
+    ];
+    for told in &told {
+        network.send(0, Priority::Standard, told);
+    }
+    network.run(SECOND);
+    let told = decisions(&mut network, 0).into_iter();
+    let told = told.filter(|it| it.source.subsystem() == 101);
+    let told: Vec<_> = told.map(|it| (it.source.component(), it.verdict)).collect();
+    let (granted, ended) = (Verdict::Granted, Verdict::Ended);
+    assert_eq!(told, [(1, granted), (1, ended), (200, granted)]);
 }
 
 #[test]
@@ -257,8 +270,8 @@ fn refused_messages_do_not_displace_the_record_of_what_was_done() {
     }
     network.run(5 * SECOND);
     assert!(network.count(0, Counter::RecordsLost) > 0);
-    let is_stop = |act: &Act| matches!(act, Act::Message { name, refusal: None, .. } if name == "SetEmergency");
-    assert!(records(&mut network, 0).iter().any(is_stop));
+    let is_stop = |it: &Decision| !it.is_refusal() && it.what == "SetEmergency";
+    assert!(decisions(&mut network, 0).iter().any(is_stop));
 }
 
 /// Handover of Enhanced Access Control: the request may be put off before it is granted.
@@ -284,22 +297,28 @@ fn a_handover_is_recorded_with_each_of_its_answers() {
         network.send(0, Priority::Standard, &raw("101.1.1", "60.1.1", answer));
     }
     network.run(SECOND);
-    let seen = records(&mut network, 0)
-        .into_iter()
-        .filter_map(|act| match act {
-            Act::Message { name, refusal, .. } => Some((name, refusal.is_none())),
-            Act::Control { is_granted, .. } => Some(("answer".to_owned(), is_granted)),
-            _ => None,
-        });
-    let seen: Vec<_> = seen.collect();
+    let seen = decisions(&mut network, 0).into_iter();
+    let seen: Vec<_> = seen.map(|it| (it.what, it.verdict)).collect();
+    let refused = Verdict::Refused(Unaccepted::Rule(Refusal::Authority {
+        asked: 200,
+        most: 127,
+    }));
     let expected = [
-        ("RequestHandoff", true),
-        ("RequestHandoff", false),
-        ("answer", false),
-        ("answer", true),
+        ("RequestHandoff", Verdict::Passed),
+        ("RequestHandoff", refused),
+        ("ConfirmHandoffRequest", Verdict::Denied),
+        ("ConfirmHandoffRequest", Verdict::Granted),
+        ("ConfirmHandoffRequest", Verdict::Granted),
     ];
     assert_eq!(
         seen,
-        expected.map(|(name, is_allowed)| (name.to_owned(), is_allowed))
+        expected.map(|(what, verdict)| (what.to_owned(), verdict))
+    );
+    let answer = network.hosts[1].received.first().unwrap();
+    let frame = judp::frames(answer.clone()).unwrap().next().unwrap();
+    assert_eq!(
+        *frame.unwrap().payload,
+        *b"\x35\xFF\0\x06",
+        "insufficient authority"
     );
 }

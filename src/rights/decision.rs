@@ -1,0 +1,358 @@
+//! What was decided about a message, for logs and audit logs, and the answer to a refused request.
+
+use std::fmt;
+
+use bytes::Bytes;
+
+use super::carried::{self, Carried};
+use super::{Permission, Table, Unaccepted, is_later, is_recorded, table};
+use crate::address::JausId;
+use crate::codec::Message as _;
+use crate::messages::core::{
+    ConfirmControl, RejectControl, RequestControl, confirm_control::ResponseCode,
+};
+use crate::wire::{Flags, Frame};
+
+/// Names of carried messages that a decision lists. Further ones are counted.
+const MOST_NAMES: usize = 4;
+/// The code of Request Handoff, by which control is requested from the client that has it. Its set is
+/// optional here.
+const REQUEST_HANDOFF: u16 = 0xFF31;
+/// Confirm Handoff Request (FF35h) about request 0, with the response code for insufficient authority.
+const HANDOFF_DENIED: &[u8] = &[0x35, 0xFF, 0, 6];
+
+/// What was decided about one message.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct Decision {
+    /// The messages that matter: `RequestControl`, or, of a message that carries others,
+    /// `RequestControl in CreateEvent`.
+    pub what: String,
+    /// The sender.
+    pub source: JausId,
+    /// The destination, which may have wildcards.
+    pub destination: JausId,
+    /// What was decided.
+    pub verdict: Verdict,
+}
+
+/// What was decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Verdict {
+    /// No rule forbids it: it was passed on to the component, which decides.
+    Passed,
+    /// It was refused.
+    Refused(Unaccepted),
+    /// The source, a component, tells the destination that it has control.
+    Granted,
+    /// The source, a component, tells the destination that it does not get control now.
+    Denied,
+    /// The source, a component, tells the destination that it no longer has control.
+    Ended,
+}
+
+impl Decision {
+    /// The decision on a frame, by which an audit log shows what its sender tried: `None` if it passes
+    /// and concerns neither control, nor an emergency, nor the configuration of a component.
+    #[must_use]
+    pub fn of(frame: &Frame, checked: Result<(), Unaccepted>, table: &Table) -> Option<Self> {
+        match checked {
+            Ok(()) if is_recorded(frame, table) => {
+                let matters = |it: Option<Permission>| it.is_some_and(Permission::is_recorded);
+                let what = what(&frame.payload, table, matters);
+                Some(Self::new(frame, what, Verdict::Passed))
+            }
+            Ok(()) => None,
+            Err(why) => {
+                let matters = |it: Option<Permission>| !it.is_some_and(Permission::is_free);
+                let what = what(&frame.payload, table, matters);
+                Some(Self::new(frame, what, Verdict::Refused(why)))
+            }
+        }
+    }
+
+    /// The decision that a component tells its client by this frame: `None` if it is about something
+    /// else than control.
+    #[must_use]
+    pub fn told_by(frame: &Frame, table: &Table) -> Option<Self> {
+        if !begins(frame) {
+            return None;
+        }
+        let verdict = match table.permission(&frame.payload) {
+            Some(Permission::Answer { is_granted: true }) => Verdict::Granted,
+            Some(Permission::Answer { is_granted: false }) => Verdict::Denied,
+            _ if frame.code() == Some(RejectControl::CODE) => Verdict::Ended,
+            _ => return None,
+        };
+        Some(Self::new(frame, table.name_of(&frame.payload), verdict))
+    }
+
+    fn new(frame: &Frame, what: String, verdict: Verdict) -> Self {
+        Self {
+            what,
+            source: frame.source,
+            destination: frame.destination,
+            verdict,
+        }
+    }
+
+    /// Whether it refuses something, so that nothing was done.
+    #[must_use]
+    pub const fn is_refusal(&self) -> bool {
+        matches!(self.verdict, Verdict::Refused(_))
+    }
+}
+
+/// One line, such as `RequestControl from 60.1.1 to 101.1.1: its sender may not take control`.
+impl fmt::Display for Decision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            what,
+            source,
+            destination,
+            verdict,
+        } = self;
+        write!(f, "{what} from {source} to {destination}")?;
+        match verdict {
+            Verdict::Refused(why) => write!(f, ": {why}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The names of the messages that matter: those that the message carries, and then its own; or its own
+/// alone.
+fn what(message: &[u8], table: &Table, matters: impl Fn(Option<Permission>) -> bool) -> String {
+    let own = table.name_of(message);
+    let mut inside = Inside::default();
+    inside.find(message, (table, carried::DEEPEST), &matters);
+    if inside.names.is_empty() && !matters(table.permission(message)) {
+        // A rule excludes what everybody may otherwise do: it may be any of them.
+        inside.find(message, (table, carried::DEEPEST), &|_| true);
+    }
+    if inside.names.is_empty() {
+        return own;
+    }
+    let names = inside.names.join(", ");
+    match inside.further {
+        0 => format!("{names} in {own}"),
+        further => format!("{names} and {further} others in {own}"),
+    }
+}
+
+/// The messages inside a message that matter, each kind once.
+#[derive(Default)]
+struct Inside {
+    names: Vec<String>,
+    further: usize,
+    /// The code of each, and whether it is for all clients, which its name tells.
+    kinds: Vec<(Option<u16>, bool)>,
+}
+
+impl Inside {
+    fn find(
+        &mut self,
+        message: &[u8],
+        (table, depth): (&Table, usize),
+        matters: &impl Fn(Option<Permission>) -> bool,
+    ) {
+        let Carried::Messages(carried) = table.carried(message) else {
+            return;
+        };
+        for message in carried.into_iter().filter(|_| depth > 0) {
+            let permission = table.permission(message);
+            let kind = (
+                table::code_of(message),
+                permission == Some(Permission::ClearAnyEmergency),
+            );
+            if matters(permission) && !self.kinds.contains(&kind) {
+                self.kinds.push(kind);
+                if self.names.len() < MOST_NAMES {
+                    self.names.push(table.name_of(message));
+                } else {
+                    self.further += 1;
+                }
+            }
+            self.find(message, (table, depth - 1), matters);
+        }
+    }
+}
+
+/// Whether a frame has the beginning of a message, and so its code.
+fn begins(frame: &Frame) -> bool {
+    !is_later(frame) && !frame.is_acknowledgement()
+}
+
+/// The answer to a refused request for control to one component: as from the component, Confirm Control
+/// or Confirm Handoff Request with the response code for insufficient authority. `None` if the frame is
+/// another message.
+#[must_use]
+pub fn denial(refused: &Frame) -> Option<Frame> {
+    if !refused.destination.is_unicast() || !begins(refused) {
+        return None;
+    }
+    let payload = match refused.code()? {
+        RequestControl::CODE => {
+            let confirm = ConfirmControl {
+                response_code: ResponseCode::INSUFFICIENT_AUTHORITY,
+            };
+            confirm.encode().ok()?
+        }
+        REQUEST_HANDOFF => Bytes::from_static(HANDOFF_DENIED),
+        _ => return None,
+    };
+    Some(Frame {
+        version: refused.version,
+        flags: Flags::new(refused.flags.priority()),
+        ..Frame::new(refused.destination, refused.source, payload)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rights::{Refusal, Rules};
+
+    const OPERATOR: JausId = JausId::new(60, 1, 1);
+    const VEHICLE: JausId = JausId::new(101, 1, 1);
+
+    fn frame(payload: &[u8]) -> Frame {
+        Frame::new(OPERATOR, VEHICLE, Bytes::copy_from_slice(payload))
+    }
+
+    /// Create Command Event: request 1, 10 s, and this message.
+    fn event(message: &[u8]) -> Vec<u8> {
+        let length = (message.len() as u32).to_le_bytes();
+        [&b"\xF6\x01\x01\x0A\0\0\0"[..], &length, message].concat()
+    }
+
+    /// Set Element: request 1, and these messages, each as an element.
+    fn list(messages: &[&[u8]]) -> Vec<u8> {
+        let mut list = vec![0x1A, 0x04, 1, messages.len() as u8];
+        for message in messages {
+            list.extend([1, 0, 0, 0, 0, 0, 0]);
+            list.extend((message.len() as u16).to_le_bytes());
+            list.extend(*message);
+        }
+        list
+    }
+
+    fn decided(rules: &str, payload: &[u8]) -> Option<Decision> {
+        let (frame, table) = (frame(payload), Table::default());
+        let rules: Rules = rules.parse().unwrap();
+        let checked = rules.check(&frame, &table).map_err(Unaccepted::Rule);
+        Decision::of(&frame, checked, &table)
+    }
+
+    const REQUEST: &[u8] = b"\x0D\x00\x64";
+    const SHUTDOWN: &[u8] = b"\x02\x00";
+    const WRENCH: &[u8] = b"\x05\x04\x00";
+
+    #[test]
+    fn carried_messages_are_recorded_by_their_own_names() {
+        for (payload, what) in [
+            (REQUEST.to_vec(), "RequestControl"),
+            (event(REQUEST), "RequestControl in CreateCommandEvent"),
+            (
+                list(&[WRENCH, REQUEST, SHUTDOWN, REQUEST]),
+                "RequestControl, Shutdown in SetElement",
+            ),
+            (
+                event(&list(&[REQUEST])),
+                "RequestControl in CreateCommandEvent",
+            ),
+        ] {
+            let allowed = decided("control=127 configure", &payload).unwrap();
+            assert_eq!((&*allowed.what, allowed.verdict), (what, Verdict::Passed));
+            assert_eq!((allowed.source, allowed.destination), (OPERATOR, VEHICLE));
+        }
+        assert_eq!(decided("command", &event(WRENCH)), None);
+    }
+
+    #[test]
+    fn a_refusal_names_what_it_is_about() {
+        let control = Verdict::Refused(Unaccepted::Rule(Refusal::Control));
+        let excluded = Verdict::Refused(Unaccepted::Rule(Refusal::Excluded));
+        for (rules, payload, what, verdict) in [
+            ("command", REQUEST.to_vec(), "RequestControl", control),
+            (
+                "command",
+                event(REQUEST),
+                "RequestControl in CreateCommandEvent",
+                control,
+            ),
+            (
+                "command except=QueryVelocityState",
+                b"\xF0\x01\x01\0\0\x01\x04\0\0\0\x04\x24\0\0".to_vec(),
+                "QueryVelocityState in CreateEvent",
+                excluded,
+            ),
+        ] {
+            let refused = decided(rules, &payload).unwrap();
+            assert_eq!((&*refused.what, refused.verdict), (what, verdict));
+            assert!(refused.is_refusal());
+        }
+        let line = decided("", REQUEST).unwrap().to_string();
+        let expected = "RequestControl from 60.1.1 to 101.1.1: its sender may not take control";
+        assert!(line.starts_with(expected), "{line}");
+    }
+
+    #[test]
+    fn of_many_kinds_the_first_are_listed_and_the_others_counted() {
+        let unknown: Vec<_> = (0..9u8).map(|it| [it, 0xDA]).collect();
+        let messages: Vec<_> = unknown.iter().map(|it| &it[..]).collect();
+        let refused = decided("command", &list(&messages)).unwrap();
+        let expected = "DA00h, DA01h, DA02h, DA03h and 5 others in SetElement";
+        assert_eq!(refused.what, expected);
+    }
+
+    #[test]
+    fn what_a_component_tells_about_control_is_told_apart() {
+        let table = Table::default();
+        let told = |payload: &[u8]| {
+            let told = Decision::told_by(&frame(payload), &table)?;
+            Some((told.what, told.verdict))
+        };
+        let some = |what: &str, verdict| Some((what.to_owned(), verdict));
+        for (payload, expected) in [
+            (
+                &b"\x0F\x00\x00"[..],
+                some("ConfirmControl", Verdict::Granted),
+            ),
+            (b"\x0F\x00\x02", some("ConfirmControl", Verdict::Denied)),
+            (
+                b"\x35\xFF\x01\x00",
+                some("ConfirmHandoffRequest", Verdict::Granted),
+            ),
+            (b"\x10\x00\x00", some("RejectControl", Verdict::Ended)),
+            (b"\x0E\x00", None),
+            (b"\x39\xFF\x00", None),
+        ] {
+            assert_eq!(told(payload), expected);
+        }
+        // The decision of the client in control about others is no release, and needs a right.
+        let decides = decided("control=1", b"\x39\xFF\x01\x01\x00").unwrap();
+        assert_eq!(decides.what, "ConfirmReleaseControl");
+        assert!(decided("", b"\x39\xFF\x01\x01\x00").unwrap().is_refusal());
+        assert_eq!(decided("", b"\x0E\x00").unwrap().what, "ReleaseControl");
+    }
+
+    #[test]
+    fn a_refused_request_is_answered_in_its_own_words() {
+        let answer = |payload: &[u8]| {
+            let frame = denial(&frame(payload))?;
+            assert_eq!((frame.source, frame.destination), (VEHICLE, OPERATOR));
+            Some(frame.payload)
+        };
+        assert_eq!(answer(REQUEST).as_deref(), Some(&b"\x0F\x00\x02"[..]));
+        let handoff = answer(b"\x31\xFF\x64\x00");
+        assert_eq!(handoff.as_deref(), Some(HANDOFF_DENIED));
+        assert_eq!(answer(SHUTDOWN), None);
+        let to_all = Frame {
+            destination: JausId::EVERYONE,
+            ..frame(REQUEST)
+        };
+        assert_eq!(denial(&to_all), None);
+    }
+}
