@@ -78,4 +78,6 @@ counters! {
     LinkGone = "not sent: the link is gone",
     TransmitQueueFull = "dropped: transmit queue full",
     NewsQueueFull = "dropped: event queue full",
+    /// Decisions that an audit log lacks, because too many different ones came at once.
+    DecisionsLost = "decisions not recorded",
 }

@@ -37,6 +37,7 @@ mod acknowledge;
 mod arrival;
 mod config;
 mod counters;
+mod decided;
 mod delivery;
 mod duplicates;
 mod egress;
@@ -64,6 +65,7 @@ pub use crate::peer::Pacing;
 pub use access::{Access, AccessEntry, AccessError, Binding, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
+pub use decided::Decided;
 pub use delivery::FlowStatus;
 #[cfg(feature = "node")]
 pub(crate) use egress::MOST_OCTETS;
@@ -80,6 +82,7 @@ pub use sink::{Ingress, Sink};
 use crate::address::JausId;
 use crate::wire::Priority;
 use acknowledge::Calls;
+use decided::Decisions;
 use delivery::Deliveries;
 use egress::{Egress, Level};
 use large::{Numbers, Reassembly};
@@ -115,6 +118,7 @@ pub struct Endpoint {
     events: VecDeque<Event>,
     /// How many of the events are results of messages.
     results: usize,
+    decisions: Decisions,
     counters: Counters,
 }
 
@@ -146,6 +150,7 @@ impl Endpoint {
             egress: Egress::new(config.clone(), keys),
             events: VecDeque::new(),
             results: 0,
+            decisions: Decisions::default(),
             counters: Counters::default(),
             config,
         }

@@ -15,7 +15,6 @@ use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
-use crate::rights::Table;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
 
 impl Endpoint {
@@ -148,7 +147,6 @@ impl Endpoint {
         let seen = self.heard.fingerprint(frame);
         self.refuse_own(arrival, seen)?;
         self.refuse_misplaced(arrival)?;
-        self.refuse_without_right(arrival)?;
         let passes = self.is_passed_on(frame);
         let is_for_us = match self.check_receivers(frame, broadcast) {
             Err(_) if passes => false,
@@ -156,6 +154,8 @@ impl Endpoint {
         };
         let is_new = self.peers.get(frame.source).is_none();
         self.gate.admit(now, path, frame.source, is_new)?;
+        // Neither a message for others nor one above the rate costs an answer or an entry.
+        self.refuse_without_right(arrival)?;
         // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
             if self.warnings.is_due(now, Warning::TableFull) {
@@ -257,19 +257,6 @@ impl Endpoint {
             warn!(%id, from = %path.peer, "refused: `peers` pins this id to another address");
         }
         Err(Counter::PinnedElsewhere)
-    }
-
-    /// Refuses messages that their senders may not send. They are not acknowledged.
-    fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
-        let (frame, path) = (arrival.frame, arrival.path);
-        let Err(reason) = self.config.access.check_rights(frame, path.peer) else {
-            return Ok(());
-        };
-        if self.warnings.is_due(arrival.now, Warning::NotGranted) {
-            let (id, name) = (frame.source, Table::default().name_of(&frame.payload));
-            warn!(%id, from = %path.peer, "refused {name}: {reason} (`access.grants`)");
-        }
-        Err(Counter::NotGranted)
     }
 
     /// Refuses a fragment whose sender is verified at another address, without acknowledging it: it

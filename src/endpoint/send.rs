@@ -113,6 +113,7 @@ impl Endpoint {
             self.send_to_sibling(handle, message, scope, sink)?;
         } else {
             self.send_away(now, handle, &message, scope)?;
+            self.record_answer(&message);
             let source = message.source;
             let message = received_locally(message, scope);
             self.deliver(&message, Some(source), sink);

@@ -17,7 +17,7 @@ use super::awaiting::{Awaiting, Waiter};
 use super::clock::{now, time_of_day};
 use super::components::{Components, Departure};
 use super::error::SendError;
-use super::events::EventSender;
+use super::events::{EventSender, Recorder};
 use super::link::Link;
 use super::links::{Links, Survey};
 use super::mailbox::Mailbox;
@@ -134,6 +134,7 @@ pub(super) struct Core {
     pub(super) components: Components,
     awaiting: Awaiting,
     pub(super) events: EventSender<Event>,
+    recorder: Option<Recorder>,
     slab: Slab,
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
@@ -151,6 +152,7 @@ impl Core {
             components: Components::default(),
             awaiting: Awaiting::default(),
             events: EventSender::default(),
+            recorder: None,
             slab: Slab::default(),
             gathered: 0,
             driver: None,
@@ -243,6 +245,12 @@ impl Core {
         Ok(result?)
     }
 
+    /// Passes decisions on messages of plain links to the recorder.
+    pub(super) fn record_decisions(&mut self, recorder: Recorder) {
+        self.endpoint.record_decisions();
+        self.recorder = Some(recorder);
+    }
+
     /// Cancels a message whose sender no longer waits for its outcome.
     pub(super) fn cancel(&mut self, destination: JausId, message: MessageHandle) {
         self.awaiting.remove(message);
@@ -313,19 +321,30 @@ impl Core {
         if transmitted {
             self.links.open.values_mut().for_each(Link::send_waiting);
         }
-        announce(&mut self.endpoint, &mut self.awaiting, &self.events);
+        announce(
+            &mut self.endpoint,
+            &mut self.awaiting,
+            (&self.events, &mut self.recorder),
+        );
         transmitted
     }
 
     /// Receives datagrams; returns whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
+        if let Some(Recorder(recorder)) = &self.recorder {
+            self.endpoint.refuse_commands(recorder.refuses_commands());
+        }
         for (&id, link) in &mut self.links.open {
             let into = (&mut self.endpoint, &mut self.components);
             more |= link.receive(cx, now, id, &mut self.slab, into);
             // Before the next link: all links together may produce more events than the queue
             // holds.
-            announce(&mut self.endpoint, &mut self.awaiting, &self.events);
+            announce(
+                &mut self.endpoint,
+                &mut self.awaiting,
+                (&self.events, &mut self.recorder),
+            );
         }
         more
     }
@@ -363,10 +382,17 @@ impl Core {
     }
 }
 
-/// Publishes the endpoint's events.
-fn announce(endpoint: &mut Endpoint, awaiting: &mut Awaiting, events: &EventSender<Event>) {
+/// Publishes the endpoint's events and decisions.
+fn announce(
+    endpoint: &mut Endpoint,
+    awaiting: &mut Awaiting,
+    (events, recorder): (&EventSender<Event>, &mut Option<Recorder>),
+) {
     while let Some(event) = endpoint.poll_event() {
         awaiting.handle_event(&event);
         events.send(event);
+    }
+    if let Some(Recorder(recorder)) = recorder {
+        std::iter::from_fn(|| endpoint.poll_decision()).for_each(|it| recorder.record(it));
     }
 }

@@ -1,8 +1,12 @@
 //! Event streams of a node, its components and connections: any number of listeners, none of which
 //! can block the sender.
 
+use std::fmt;
+
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
+
+use crate::endpoint::Decided;
 
 /// Events kept for a slow listener.
 const KEPT: usize = 256;
@@ -64,5 +68,23 @@ impl<T: Clone> EventSender<T> {
     /// Ends the listeners' streams.
     pub(super) fn end(&mut self) {
         self.0 = None;
+    }
+}
+
+/// Takes the decisions on messages of plain links.
+pub trait DecisionRecorder: Send {
+    /// Records a decision. It must not block.
+    fn record(&mut self, decided: Decided);
+
+    /// Whether what changes something is to be refused now, because it could not be recorded.
+    fn refuses_commands(&self) -> bool;
+}
+
+/// The recorder of a node.
+pub(super) struct Recorder(pub(super) Box<dyn DecisionRecorder>);
+
+impl fmt::Debug for Recorder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Recorder")
     }
 }

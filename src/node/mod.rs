@@ -61,7 +61,8 @@ pub use self::clock::{now, sleep_until, time_of_day};
 pub use self::components::{ComponentEvent, Departure};
 pub use self::config::{Config, ConfigError, Delivery, PeerAddress, Tcp, units};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
-pub use self::events::EventStream;
+use self::events::Recorder;
+pub use self::events::{DecisionRecorder, EventStream};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
@@ -325,6 +326,14 @@ impl Node {
     #[must_use]
     pub fn events(&self) -> Events {
         self.shared().lock().events.subscribe()
+    }
+
+    /// From now on, passes each decision on a message of a plain link to a recorder, for an audit log:
+    /// refused messages, and what concerns control, emergencies and the configuration of components.
+    /// Secure links record their own. It replaces an earlier recorder.
+    pub fn record_decisions(&self, recorder: impl DecisionRecorder + 'static) {
+        let recorder = Recorder(Box::new(recorder));
+        self.shared().lock().record_decisions(recorder);
     }
 
     /// Stops the node. First the components of this process stop what they move and release what

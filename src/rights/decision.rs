@@ -5,7 +5,7 @@ use std::fmt;
 use bytes::Bytes;
 
 use super::carried::{self, Carried};
-use super::{Permission, Table, Unaccepted, is_later, is_recorded, table};
+use super::{Permission, Refusal, Rules, Table, Unaccepted, is_later, is_recorded, table};
 use crate::address::JausId;
 use crate::codec::Message as _;
 use crate::messages::core::{
@@ -184,6 +184,15 @@ fn begins(frame: &Frame) -> bool {
     !is_later(frame) && !frame.is_acknowledgement()
 }
 
+/// Checks a frame while nothing can be recorded: what only queries, ends or stops, passes.
+///
+/// # Errors
+/// [`Refusal::Unrecorded`].
+pub fn check_unrecorded(frame: &Frame, table: &Table) -> Result<(), Refusal> {
+    let checked = Rules::default().check(frame, table);
+    checked.map_err(|_| Refusal::Unrecorded)
+}
+
 /// The answer to a refused request for control to one component: as from the component, Confirm Control
 /// or Confirm Handoff Request with the response code for insufficient authority. `None` if the frame is
 /// another message.
@@ -212,7 +221,6 @@ pub fn denial(refused: &Frame) -> Option<Frame> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rights::{Refusal, Rules};
 
     const OPERATOR: JausId = JausId::new(60, 1, 1);
     const VEHICLE: JausId = JausId::new(101, 1, 1);

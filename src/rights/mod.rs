@@ -30,6 +30,7 @@
 mod accept;
 mod carried;
 mod decision;
+mod queue;
 mod selection;
 mod table;
 
@@ -38,7 +39,8 @@ use std::str::FromStr;
 
 pub(crate) use accept::check as check_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
-pub use decision::{Decision, Verdict, denial};
+pub use decision::{Decision, Verdict, check_unrecorded, denial};
+pub use queue::{Decided, DecisionQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 
@@ -122,6 +124,9 @@ pub enum Refusal {
     /// The command is not among [`Rules::only`], or the message is among [`Rules::except`].
     #[error("`only` or `except` in the line of its sender excludes this message")]
     Excluded,
+    /// It would change something while the audit log cannot be written, and that is to be recorded.
+    #[error("the audit log cannot be written: until then only queries and stops are accepted")]
+    Unrecorded,
     /// The message is too short to have a message code.
     #[error("it has no message code")]
     NoCode,

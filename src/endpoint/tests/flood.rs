@@ -1,6 +1,7 @@
 //! Floods of invented senders: bounded cost, and undisturbed conversations.
 
 use super::*;
+use crate::rights::Verdict;
 
 const FLOOD: u32 = 100_000;
 const SOURCES: u32 = 10_000;
@@ -201,6 +202,110 @@ fn who_has_no_right_to_a_message_is_refused_and_counted() {
         assert_eq!(!rig.received().is_empty(), is_heard, "{number}");
     }
     assert_eq!(rig.count(Counter::NotGranted), 4);
+}
+
+/// A rig whose operators of subsystem 42 may observe.
+fn watched() -> Rig {
+    let access = Access {
+        grants: vec!["42 observe".parse().unwrap()],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    rig.endpoint.record_decisions();
+    rig
+}
+
+fn decisions(rig: &mut Rig) -> Vec<(String, u64)> {
+    let decided = std::iter::from_fn(|| rig.endpoint.poll_decision());
+    decided
+        .map(|it| (it.decision.to_string(), it.times))
+        .collect()
+}
+
+fn request_control() -> Frame {
+    from_peer(b"\x0D\x00\x64")
+}
+
+#[test]
+fn a_refused_request_is_answered_and_recorded_once_with_its_number() {
+    let mut rig = watched();
+    rig.hear(&request_control());
+    let answers = rig.sent();
+    let (to, answer) = &answers[0];
+    assert_eq!((answers.len(), *to), (1, To::Peer(path(PEER_HOST).peer)));
+    assert_eq!(answer.payload[..], b"\x0F\x00\x02"[..]);
+    assert_eq!((answer.source, answer.destination), (US, PEER));
+    for sequence in 2..=5 {
+        rig.hear(&Frame {
+            sequence,
+            ..request_control()
+        });
+    }
+    assert_eq!(rig.endpoint.route(PEER), None, "nothing is learned");
+    let decided = decisions(&mut rig);
+    assert_eq!(decided.len(), 1);
+    assert!(
+        decided[0].0.starts_with("RequestControl from 42.1.1"),
+        "{decided:?}"
+    );
+    assert_eq!(decided[0].1, 5);
+}
+
+#[test]
+fn a_flood_of_refusals_does_not_displace_what_was_done() {
+    let mut rig = watched();
+    for number in 0..1000 {
+        rig.hear(&Frame {
+            sequence: number,
+            ..Frame::new(PEER, US, Bytes::from(vec![number as u8, 0xDA, 0]))
+        });
+    }
+    rig.hear(&from_peer(b"\x06\x00\x01\x00"));
+    let decided = decisions(&mut rig);
+    assert!(
+        decided.iter().any(|it| it.0.starts_with("SetEmergency")),
+        "{decided:?}"
+    );
+    assert_eq!(decided.len(), 129);
+    assert!(rig.count(Counter::DecisionsLost) > 0);
+}
+
+#[test]
+fn what_cannot_be_recorded_is_refused_but_stops_are_not() {
+    let mut rig = Rig::new();
+    rig.endpoint.refuse_commands(true);
+    rig.hear(&request_control());
+    assert!(rig.received().is_empty());
+    rig.hear(&from_peer(b"\x06\x00\x01\x00"));
+    assert_eq!(rig.received().len(), 1);
+    assert_eq!(rig.count(Counter::NotGranted), 1);
+}
+
+#[test]
+fn what_components_tell_clients_of_plain_links_is_recorded() {
+    let mut rig = watched();
+    rig.meet_peer();
+    for told in [&b"\x0F\x00\x00"[..], b"\x10\x00\x00", QUERY_HEARTBEAT] {
+        let told = Outgoing::new(US, PEER, Bytes::from_static(told));
+        rig.send(told).unwrap();
+    }
+    let told = std::iter::from_fn(|| rig.endpoint.poll_decision());
+    let told: Vec<_> = told.map(|it| it.decision.verdict).collect();
+    assert_eq!(told, [Verdict::Granted, Verdict::Ended]);
+}
+
+#[test]
+fn a_message_for_others_is_neither_decided_on_nor_answered() {
+    let mut rig = watched();
+    rig.hear(&Frame {
+        destination: id("102.1.1"),
+        ..request_control()
+    });
+    assert_eq!(rig.count(Counter::NotForUs), 1);
+    assert!(rig.sent().is_empty() && decisions(&mut rig).is_empty());
 }
 
 #[test]

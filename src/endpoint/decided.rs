@@ -1,0 +1,105 @@
+//! The decisions on messages of plain links, for an audit log.
+
+use tracing::warn;
+
+use super::arrival::Arrival;
+use super::verify::Warning;
+use super::{Counter, Endpoint, Outgoing, Remote};
+use crate::rights::{self, Decision, DecisionQueue, Table, Unaccepted, check_unrecorded, denial};
+use crate::wire::Frame;
+
+/// A decision on a message of a plain link, or on the control of a client there.
+pub type Decided = rights::Decided<Remote>;
+
+/// What was decided and is not polled yet.
+#[derive(Debug, Default)]
+pub(super) struct Decisions {
+    /// Whether anybody polls.
+    is_recording: bool,
+    /// Whether what changes something is refused, because it could not be recorded.
+    is_refusing: bool,
+    waiting: DecisionQueue<Remote>,
+}
+
+impl Endpoint {
+    /// Keeps decisions on messages of plain links for [`poll_decision`](Self::poll_decision): refused
+    /// messages, and what concerns control, emergencies and the configuration of components. Secure
+    /// links record their own.
+    pub fn record_decisions(&mut self) {
+        self.decisions.is_recording = true;
+    }
+
+    /// Whether to refuse what changes something, because it could not be recorded, on plain links.
+    pub fn refuse_commands(&mut self, is_refusing: bool) {
+        self.decisions.is_refusing = is_refusing;
+    }
+
+    /// The next decision for an audit log. Those for which the queue has no room are counted
+    /// as [`Counter::DecisionsLost`].
+    pub fn poll_decision(&mut self) -> Option<Decided> {
+        self.decisions.waiting.pop()
+    }
+
+    /// Decides by the rights of the sender. A refused message is not acknowledged; a request for control
+    /// is answered.
+    pub(super) fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let Arrival {
+            frame, now, path, ..
+        } = arrival;
+        let checked = self.check_rights(frame, path.peer);
+        if checked.is_ok() && (!self.decisions.is_recording || is_session(path.peer)) {
+            return Ok(());
+        }
+        let Some(decision) = Decision::of(frame, checked, &Table::default()) else {
+            return Ok(());
+        };
+        let warning = Warning::NotGranted;
+        if decision.is_refusal() && self.warnings.is_due(now, warning) {
+            warn!(from = %path.peer, "refused {decision}");
+        }
+        self.record(decision, path.peer);
+        if checked.is_ok() {
+            return Ok(());
+        }
+        if let Some(denial) = denial(frame) {
+            // What cannot be encoded for the link is not answered.
+            let _sent = self.send_along(now, path, &denial);
+        }
+        Err(Counter::NotGranted)
+    }
+
+    /// Records what a component tells a client of a plain link about its control.
+    pub(super) fn record_answer(&mut self, message: &Outgoing) {
+        if !self.decisions.is_recording {
+            return;
+        }
+        let (client, payload) = (message.destination, message.payload.clone());
+        let frame = Frame::new(message.source, client, payload);
+        if let Some(told) = Decision::told_by(&frame, &Table::default())
+            && let Some((path, _)) = self.route(client)
+        {
+            self.record(told, path.peer);
+        }
+    }
+
+    fn check_rights(&self, frame: &Frame, from: Remote) -> Result<(), Unaccepted> {
+        self.config.access.check_rights(frame, from)?;
+        if !self.decisions.is_refusing || is_session(from) {
+            return Ok(());
+        }
+        check_unrecorded(frame, &Table::default()).map_err(Unaccepted::Rule)
+    }
+
+    fn record(&mut self, decision: Decision, client: Remote) {
+        let is_plain = !is_session(client);
+        if self.decisions.is_recording && is_plain && !self.decisions.waiting.push(decision, client)
+        {
+            self.counters.add(Counter::DecisionsLost);
+        }
+    }
+}
+
+/// Whether the link decides and records itself.
+const fn is_session(remote: Remote) -> bool {
+    matches!(remote, Remote::Session(_))
+}
