@@ -131,15 +131,41 @@ impl Entry {
         self
     }
 
+    /// How often it happened.
+    #[must_use]
+    pub const fn times(mut self, times: u64) -> Self {
+        self.times = times;
+        self
+    }
+
     /// Whether it differs from another entry in nothing but time.
     pub(crate) fn repeats(&self, other: &Self) -> bool {
-        let Self { time, times, .. } = other;
-        let (time, times) = (*time, *times);
-        Self {
-            time,
-            times,
-            ..self.clone()
-        } == *other
+        let parts = |it: &Self| {
+            let Self {
+                time: _,
+                who,
+                what,
+                to,
+                result,
+                why,
+                id,
+                address,
+                key,
+                times: _,
+            } = it;
+            (who, what, to, result, why, id, address, key)
+                == (
+                    &self.who,
+                    &self.what,
+                    &self.to,
+                    &self.result,
+                    &self.why,
+                    &self.id,
+                    &self.address,
+                    &self.key,
+                )
+        };
+        parts(other)
     }
 }
 

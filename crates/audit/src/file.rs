@@ -1,10 +1,13 @@
 //! The files of the log: appended to, renamed when full, the oldest removed.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use jaus_files::{Readers, append};
+
+use crate::chain::ChainEnd;
+use crate::entry::Entry;
 
 /// Limits of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,7 +19,7 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// Nine files of 8 MiB, about 400 000 entries.
+    /// Nine files of 8 MiB, about 250 000 entries.
     fn default() -> Self {
         Self {
             file: 8 << 20,
@@ -32,35 +35,56 @@ pub(crate) struct LogFile {
     limits: Limits,
     file: File,
     length: u64,
+    chain: ChainEnd,
     /// Whether the last line may be incomplete, because it could not be written.
     is_torn: bool,
 }
 
 impl LogFile {
+    /// Opens a file, or continues it. Another program cannot open it meanwhile.
     pub(crate) fn open(path: &Path, limits: Limits) -> io::Result<Self> {
-        let file = append(path, Readers::Owner)?;
-        let length = file.metadata()?.len();
+        let file = locked(path)?;
+        let content = fs::read(path)?;
+        let chain = match ChainEnd::of(&content) {
+            Some(chain) => chain,
+            None => end_of_full(path)?,
+        };
         Ok(Self {
             path: path.to_owned(),
             limits,
             file,
-            length,
-            is_torn: false,
+            length: content.len() as u64,
+            chain,
+            is_torn: content.last().is_some_and(|&octet| octet != b'\n'),
         })
     }
 
-    /// Appends a line, in a single write so that a crash leaves no half of it.
-    pub(crate) fn append(&mut self, line: &[u8]) -> io::Result<()> {
+    /// Appends an entry, in a single write so that a crash leaves no half of it.
+    pub(crate) fn append(&mut self, entry: &Entry) -> io::Result<()> {
+        if self.is_torn {
+            self.end_torn_line()?;
+        }
+        let (line, chain) = self.chain.seal(entry)?;
         if self.length > 0 && self.length + line.len() as u64 > self.limits.file {
             self.rotate()?;
         }
-        if std::mem::take(&mut self.is_torn) {
-            self.file.write_all(b"\n")?;
-        }
         self.is_torn = true;
-        self.file.write_all(line)?;
+        self.file.write_all(&line)?;
         self.is_torn = false;
         self.length += line.len() as u64;
+        self.chain = chain;
+        Ok(())
+    }
+
+    /// Ends a line that is incomplete. The next one has its hash.
+    fn end_torn_line(&mut self) -> io::Result<()> {
+        let content = fs::read(&self.path)?;
+        if content.last().is_some_and(|&octet| octet != b'\n') {
+            self.file.write_all(b"\n")?;
+        }
+        self.length = content.len() as u64 + 1;
+        self.chain = ChainEnd::of(&content).unwrap_or(self.chain);
+        self.is_torn = false;
         Ok(())
     }
 
@@ -82,28 +106,56 @@ impl LogFile {
         for number in (1..=moved).rev() {
             let from = match number {
                 1 => self.path.clone(),
-                _ => self.full(number - 1),
+                _ => full(&self.path, number - 1),
             };
-            match fs::rename(from, self.full(number)) {
+            match fs::rename(from, full(&self.path, number)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}
             }
         }
-        self.file = append(&self.path, Readers::Owner)?;
+        self.file = locked(&self.path)?;
         self.length = 0;
         Ok(())
     }
+}
 
-    fn full(&self, number: u32) -> PathBuf {
-        let mut name = self.path.clone().into_os_string();
-        name.push(format!(".{number}"));
-        name.into()
+/// Opens a file for this program alone: the lines of two would break the chain.
+fn locked(path: &Path) -> io::Result<File> {
+    let file = append(path, Readers::Owner)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(io::Error::new(
+            io::ErrorKind::ResourceBusy,
+            "another program writes to it: name a file for each",
+        )),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
+}
+
+/// A full file of the log with this path; the newest is number 1.
+pub(crate) fn full(path: &Path, number: u32) -> PathBuf {
+    let mut name = path.to_owned().into_os_string();
+    name.push(format!(".{number}"));
+    name.into()
+}
+
+/// The end of the chain in the newest full file.
+fn end_of_full(path: &Path) -> io::Result<ChainEnd> {
+    match fs::read(full(path, 1)) {
+        Ok(content) => Ok(ChainEnd::of(&content).unwrap_or_default()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(ChainEnd::default()),
+        Err(error) => Err(error),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::entry::Outcome;
+
+    fn entry(what: &str) -> Entry {
+        Entry::new("console", what, Outcome::Allowed)
+    }
 
     #[test]
     fn a_full_file_is_renamed_and_the_oldest_removed() {
@@ -111,25 +163,29 @@ mod tests {
         let path = folder.path().join("audit.jsonl");
         let limits = Limits { file: 10, kept: 2 };
         let mut log = LogFile::open(&path, limits).unwrap();
-        for line in ["one....\n", "two....\n", "three..\n", "four...\n"] {
-            log.append(line.as_bytes()).unwrap();
+        for what in ["one", "two", "three", "four"] {
+            log.append(&entry(what)).unwrap();
         }
-        let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-        assert_eq!(read("audit.jsonl"), "four...\n");
-        assert_eq!(read("audit.jsonl.1"), "three..\n");
-        assert_eq!(read("audit.jsonl.2"), "two....\n");
+        let has = |name: &str, what: &str| {
+            let text = fs::read_to_string(folder.path().join(name)).unwrap();
+            text.lines().count() == 1 && text.contains(what)
+        };
+        assert!(has("audit.jsonl", "four") && has("audit.jsonl.1", "three"));
+        assert!(has("audit.jsonl.2", "two"));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 
     #[test]
-    fn an_existing_file_is_continued() {
+    fn an_existing_file_is_continued_but_not_by_two_programs() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.jsonl");
-        for line in ["one\n", "two\n"] {
+        for what in ["one", "two"] {
             let mut log = LogFile::open(&path, Limits::default()).unwrap();
-            log.append(line.as_bytes()).unwrap();
+            log.append(&entry(what)).unwrap();
+            let second = LogFile::open(&path, Limits::default()).unwrap_err();
+            assert!(second.to_string().contains("another program"), "{second}");
         }
-        assert_eq!(fs::read_to_string(&path).unwrap(), "one\ntwo\n");
+        assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), 2);
     }
 
     #[cfg(unix)]

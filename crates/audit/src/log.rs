@@ -4,22 +4,26 @@
     reason = "the thread of the log waits in real time"
 )]
 
+use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::entry::{Entry, Outcome};
-use crate::file::{Limits, LogFile};
-use crate::repeats::Repeats;
+use crate::file::Limits;
+use crate::forward::{ForwardTo, Forwarder};
+use crate::stream::Stream;
 
-/// Entries that may wait for the disk.
+/// Entries that may wait for the disk; refusals have half of the places.
 const WAITING: usize = 1024;
 /// The shortest interval between reports that the log cannot be written.
 const REPORT_PAUSE: Duration = Duration::from_secs(60);
+/// How often writing is tried again after an error.
+const RETRY: Duration = Duration::from_secs(1);
 /// A wait without an end in sight.
 const LONG: Duration = Duration::from_secs(3600);
 
@@ -27,10 +31,48 @@ const LONG: Duration = Duration::from_secs(3600);
 #[derive(Debug, thiserror::Error)]
 #[error("the audit log {} cannot be written: {source}", .path.display())]
 pub struct AuditError {
-    /// The file.
+    /// The file, or the place to which it is forwarded.
     path: PathBuf,
     /// The reason.
     source: io::Error,
+}
+
+/// What happens while the log cannot be written, such as on a full disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unwritable {
+    /// Everything goes on, with an error in the program's log.
+    #[default]
+    GoOn,
+    /// Commands and requests for control are refused, too. Stops and queries are not.
+    RefuseCommands,
+}
+
+/// The settings of a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct AuditSettings {
+    /// The limits of each of its two files.
+    pub limits: Limits,
+    /// What happens while it cannot be written.
+    pub unwritable: Unwritable,
+    /// Where entries go besides.
+    pub forward: Option<ForwardTo>,
+}
+
+impl AuditSettings {
+    /// Sets what happens while the log cannot be written.
+    #[must_use]
+    pub const fn unwritable(mut self, unwritable: Unwritable) -> Self {
+        self.unwritable = unwritable;
+        self
+    }
+
+    /// Forwards entries as well.
+    #[must_use]
+    pub fn forward(mut self, to: Option<ForwardTo>) -> Self {
+        self.forward = to;
+        self
+    }
 }
 
 /// An open audit log. Clones write to the same log; the last one to be dropped waits until all
@@ -41,49 +83,98 @@ pub struct AuditLog(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     entries: Mutex<Option<SyncSender<Entry>>>,
-    lost: Arc<AtomicU64>,
+    shared: Arc<Shared>,
+    unwritable: Unwritable,
     thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// What the log and its thread know of each other.
+#[derive(Debug, Default)]
+struct Shared {
+    /// Entries for which there was no room in the queue.
+    lost: AtomicU64,
+    lost_refusals: AtomicU64,
+    /// Refusals in the queue.
+    refusals: AtomicUsize,
+    /// Whether the last attempt to write has failed.
+    is_broken: AtomicBool,
+}
+
+/// The file of the refusals beside that of the evidence: `audit-refused.jsonl` beside `audit.jsonl`.
+#[must_use]
+pub fn refusals_of(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().map_or_else(OsString::new, OsString::from);
+    name.push("-refused");
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 impl AuditLog {
     /// Opens a log, or continues it.
     ///
     /// # Errors
-    /// If the file cannot be opened for appending.
-    pub fn open(path: &Path, limits: Limits) -> Result<Self, AuditError> {
-        let in_file = |source| AuditError {
-            path: path.to_owned(),
-            source,
+    /// If a file cannot be opened for appending, or is another program's; or if the place to forward to
+    /// cannot be reached.
+    pub fn open(path: &Path, settings: AuditSettings) -> Result<Self, AuditError> {
+        let refusals = refusals_of(path);
+        let at = |path: &Path| {
+            let path = path.to_owned();
+            move |source| AuditError { path, source }
         };
-        let file = LogFile::open(path, limits).map_err(in_file)?;
-        let (entries, queue) = sync_channel(WAITING);
-        let lost = Arc::new(AtomicU64::new(0));
+        let limits = settings.limits;
+        let forward = settings.forward.map(|to| {
+            let place = PathBuf::from(to.to_string());
+            Forwarder::open(to).map_err(at(&place))
+        });
+        let shared = Arc::new(Shared::default());
         let writer = Writer {
-            file,
-            lost: lost.clone(),
-            repeats: Repeats::default(),
+            evidence: Stream::open(path, limits, Outcome::Allowed).map_err(at(path))?,
+            refusals: Stream::open(&refusals, limits, Outcome::Refused).map_err(at(&refusals))?,
+            forward: forward.transpose()?,
+            shared: shared.clone(),
+            unwritten: 0,
             reported: None,
         };
+        let (entries, queue) = sync_channel(WAITING);
         let thread = std::thread::Builder::new().name("jaus-audit".to_owned());
-        let thread = thread.spawn(move || writer.run(&queue)).map_err(in_file)?;
+        let thread = thread.spawn(move || writer.run(&queue)).map_err(at(path))?;
         Ok(Self(Arc::new(Inner {
             entries: Mutex::new(Some(entries)),
-            lost,
+            shared,
+            unwritable: settings.unwritable,
             thread: Mutex::new(Some(thread)),
         })))
     }
 
-    /// Adds an entry. Never waits: if the disk is too slow, the entry is lost and counted.
+    /// Adds an entry. Never waits: if the disk is too slow, the entry is lost and counted, refusals first.
     pub fn write(&self, entry: Entry) {
-        let entries = self
-            .0
-            .entries
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let Some(entries) = &*entries else { return };
-        if let Err(TrySendError::Full(_)) = entries.try_send(entry) {
-            self.0.lost.fetch_add(1, Ordering::Relaxed);
+        let entries = &self.0.entries;
+        let entries = entries.lock().unwrap_or_else(PoisonError::into_inner);
+        let (Some(entries), shared) = (&*entries, &self.0.shared) else {
+            return;
+        };
+        let is_refusal = entry.result == Outcome::Refused;
+        let lost = match is_refusal {
+            true => &shared.lost_refusals,
+            false => &shared.lost,
+        };
+        let one = usize::from(is_refusal);
+        let waiting = shared.refusals.fetch_add(one, Ordering::Relaxed);
+        let has_room = !is_refusal || waiting < WAITING / 2;
+        if !has_room || entries.try_send(entry).is_err() {
+            shared.refusals.fetch_sub(one, Ordering::Relaxed);
+            lost.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Whether commands are to be refused, because what they do could not be recorded.
+    #[must_use]
+    pub fn refuses_commands(&self) -> bool {
+        let is_broken = self.0.shared.is_broken.load(Ordering::Relaxed);
+        is_broken && self.0.unwritable == Unwritable::RefuseCommands
     }
 }
 
@@ -102,9 +193,12 @@ impl Drop for Inner {
 
 /// The thread of the log.
 struct Writer {
-    file: LogFile,
-    lost: Arc<AtomicU64>,
-    repeats: Repeats,
+    evidence: Stream,
+    refusals: Stream,
+    forward: Option<Forwarder>,
+    shared: Arc<Shared>,
+    /// Entries that could not be written.
+    unwritten: u64,
     /// When an error was last reported.
     reported: Option<Instant>,
 }
@@ -113,8 +207,14 @@ impl Writer {
     fn run(mut self, queue: &Receiver<Entry>) {
         loop {
             let now = Instant::now();
-            let due = self.repeats.due();
+            let due = self.evidence.due().into_iter().chain(self.refusals.due());
+            let due = due.min();
             let wait = due.map_or(LONG, |due| due.saturating_duration_since(now));
+            let wait = if self.unwritten > 0 {
+                wait.min(RETRY)
+            } else {
+                wait
+            };
             let ended = match queue.recv_timeout(wait) {
                 Ok(first) => {
                     let entries = std::iter::once(first).chain(queue.try_iter());
@@ -124,14 +224,9 @@ impl Writer {
                 Err(RecvTimeoutError::Timeout) => false,
                 Err(RecvTimeoutError::Disconnected) => true,
             };
-            let until = (!ended).then(Instant::now);
-            for counted in self.repeats.take(until) {
-                self.append(&counted);
-            }
+            self.write_counted((!ended).then(Instant::now));
             self.note_losses();
-            if let Err(error) = self.file.sync() {
-                self.report(&error);
-            }
+            self.sync();
             if ended {
                 return;
             }
@@ -139,31 +234,92 @@ impl Writer {
     }
 
     fn note(&mut self, entry: &Entry) {
-        if self.repeats.is_new(Instant::now(), entry) {
-            self.append(entry);
+        let now = Instant::now();
+        let is_refusal = entry.result == Outcome::Refused;
+        let stream = match is_refusal {
+            true => &mut self.refusals,
+            false => &mut self.evidence,
+        };
+        match stream.note(now, entry) {
+            Ok(Some(entry)) => self.forward(entry),
+            Ok(None) => {}
+            Err(error) => self.fail(&error),
+        }
+        if is_refusal {
+            self.shared.refusals.fetch_sub(1, Ordering::Relaxed);
         }
     }
 
-    fn note_losses(&mut self) {
-        let lost = self.lost.swap(0, Ordering::Relaxed);
-        if lost > 0 {
-            let entry = Entry::new("jaus", "audit", Outcome::Failed);
-            self.append(&Entry {
-                times: lost,
-                ..entry.because("entries lost, because the disk was too slow")
-            });
+    fn write_counted(&mut self, until: Option<Instant>) {
+        for entry in self.evidence.counted(until) {
+            self.append(&entry);
+        }
+        for entry in self.refusals.counted(until) {
+            self.append(&entry);
         }
     }
 
+    /// Appends an entry to the file of its kind.
     fn append(&mut self, entry: &Entry) {
-        let line = serde_json::to_vec(entry).map_err(io::Error::from);
-        let appended = line.and_then(|mut line| {
-            line.push(b'\n');
-            self.file.append(&line)
-        });
-        if let Err(error) = appended {
-            self.report(&error);
+        let stream = match entry.result {
+            Outcome::Refused => &mut self.refusals,
+            _ => &mut self.evidence,
+        };
+        match stream.append(entry) {
+            Ok(()) => self.forward(entry),
+            Err(error) => self.fail(&error),
         }
+    }
+
+    /// Records what is not recorded, in the file in which it is missing.
+    fn note_losses(&mut self) {
+        let slow = "entries lost, because the disk was too slow";
+        let failed = "entries lost, because the log could not be written";
+        let unwritten = std::mem::take(&mut self.unwritten);
+        for (lost, why) in [
+            (self.shared.lost.swap(0, Ordering::Relaxed), slow),
+            (unwritten, failed),
+        ] {
+            if lost > 0 {
+                let entry = Entry::new("jaus", "audit", Outcome::Failed);
+                let before = self.unwritten;
+                self.append(&entry.because(why).times(lost));
+                if self.unwritten > before {
+                    // Itself was not written either; it is no entry that is lost.
+                    self.unwritten = before + lost;
+                }
+            }
+        }
+        let refusals = self.shared.lost_refusals.swap(0, Ordering::Relaxed);
+        if refusals > 0 {
+            let entry = Entry::new("jaus", "audit", Outcome::Refused);
+            self.append(&entry.because(slow).times(refusals));
+        }
+    }
+
+    /// Waits for the disk, and notes whether the log can be written.
+    fn sync(&mut self) {
+        let synced = self.evidence.sync().and_then(|()| self.refusals.sync());
+        if let Err(error) = &synced {
+            self.report(error);
+        }
+        let is_broken = synced.is_err() || self.unwritten > 0;
+        let was_broken = self.shared.is_broken.swap(is_broken, Ordering::Relaxed);
+        if was_broken && !is_broken {
+            self.reported = None;
+            tracing::info!("the audit log is written again");
+        }
+    }
+
+    fn forward(&mut self, entry: &Entry) {
+        if let Some(forward) = &mut self.forward {
+            forward.send(entry);
+        }
+    }
+
+    fn fail(&mut self, error: &io::Error) {
+        self.unwritten += 1;
+        self.report(error);
     }
 
     fn report(&mut self, error: &io::Error) {
@@ -193,24 +349,92 @@ mod tests {
     fn each_entry_is_a_line_and_repetitions_are_counted() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.jsonl");
-        let log = AuditLog::open(&path, Limits::default()).unwrap();
+        let log = AuditLog::open(&path, AuditSettings::default()).unwrap();
         for _ in 0..100 {
             log.clone()
-                .write(Entry::new("tablet", "SetWrenchEffort", Outcome::Refused).to("101.1.1"));
+                .write(Entry::new("tablet", "Reset", Outcome::Allowed).to("101.1.1"));
         }
         log.write(Entry::new("console\n", "login", Outcome::Allowed));
         drop(log);
         let lines = lines(&path);
         assert_eq!(lines.len(), 3);
-        assert_eq!(lines[0]["what"], "SetWrenchEffort");
+        assert_eq!(lines[0]["what"], "Reset");
         assert_eq!(lines[0].get("times"), None);
         assert_eq!(lines[1]["who"], "console\n");
-        assert_eq!(lines[2]["times"], 99);
+        assert_eq!(
+            (&lines[2]["times"], &lines[2]["number"]),
+            (&99.into(), &3.into())
+        );
+    }
+
+    #[test]
+    fn refusals_have_a_file_of_their_own_and_push_no_evidence_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.jsonl");
+        let settings = AuditSettings {
+            limits: Limits {
+                file: 4096,
+                kept: 1,
+            },
+            ..AuditSettings::default()
+        };
+        let log = AuditLog::open(&path, settings).unwrap();
+        log.write(Entry::new("console", "RequestControl", Outcome::Allowed));
+        for index in 0..20_000 {
+            let refusal = Entry::new(format!("host {index}"), "connect", Outcome::Refused);
+            log.write(refusal.because(index));
+        }
+        log.write(Entry::new("console", "ReleaseControl", Outcome::Allowed));
+        drop(log);
+        let evidence = lines(&path);
+        let whats: Vec<_> = evidence.iter().map(|it| &it["what"]).collect();
+        assert_eq!(whats, ["RequestControl", "ReleaseControl"]);
+        let refused = lines(&folder.path().join("audit-refused.jsonl"));
+        assert!(
+            refused.iter().any(|it| it["times"].as_u64() > Some(1)),
+            "they are counted"
+        );
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn while_it_cannot_be_written_commands_are_refused_if_so_set() {
+        // Rotation fails, because a folder is in its way.
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.jsonl");
+        let obstacle = folder.path().join("audit.jsonl.1");
+        let settings = AuditSettings {
+            limits: Limits { file: 10, kept: 1 },
+            ..AuditSettings::default()
+        };
+        let wait_for = |what: &dyn Fn() -> bool| {
+            let end = Instant::now() + Duration::from_secs(20);
+            while !what() && Instant::now() < end {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            assert!(what());
+        };
+        let settings = settings.unwritable(Unwritable::RefuseCommands);
+        let log = AuditLog::open(&path, settings).unwrap();
+        fs::create_dir_all(obstacle.join("not empty")).unwrap();
+        for what in ["one", "two", "three"] {
+            log.write(Entry::new("console", what, Outcome::Allowed));
+        }
+        wait_for(&|| log.refuses_commands());
+        fs::remove_dir_all(&obstacle).unwrap();
+        wait_for(&|| !log.refuses_commands());
+        drop(log);
+        let last = lines(&path).pop().unwrap();
+        assert_eq!(
+            (&last["result"], &last["times"]),
+            (&"failed".into(), &2.into())
+        );
+        crate::verify(&path, None).unwrap();
     }
 
     #[test]
     fn a_folder_that_is_not_there_is_named() {
-        let error = AuditLog::open(Path::new("/none/audit.jsonl"), Limits::default());
+        let error = AuditLog::open(Path::new("/none/audit.jsonl"), AuditSettings::default());
         let error = error.unwrap_err().to_string();
         assert!(error.contains("/none/audit.jsonl"), "{error}");
     }

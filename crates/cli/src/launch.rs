@@ -18,6 +18,7 @@ use super::{output, reference, runtime, settings};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
+use jaus_audit::AuditLog;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// The flags of a program with a single [`Part`].
@@ -39,6 +40,9 @@ pub trait Ready: Args {
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
         |_: &mut Config| {}
     }
+
+    /// Takes the audit log of the program, if there is one.
+    fn audit(&mut self, _log: Option<AuditLog>) {}
 
     /// Creates the component from the flags.
     ///
@@ -115,7 +119,9 @@ fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
 impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
         let for_node = self.flags.for_node();
-        let mut part = self.flags.part()?;
+        let mut flags = self.flags;
+        flags.audit(self.network.audit()?);
+        let mut part = flags.part()?;
         logging::use_level(self.network.log_level()?);
         runtime::run(async {
             let levels = LevelRequests::accept(self.network.file());

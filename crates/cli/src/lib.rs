@@ -8,6 +8,7 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
+pub mod audit;
 pub mod failure;
 mod fence;
 pub mod folders;

@@ -16,7 +16,9 @@ use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
 use jaus::node::{Address, Config, Host, HostError, Node, PeerAddress, Port, Sender};
 use jaus::rights::Grant;
+use jaus_audit::AuditLog;
 
+use super::audit::{AuditFlags, PlainLinks};
 use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
@@ -133,6 +135,9 @@ pub struct Network {
     #[cfg(feature = "secure")]
     #[command(flatten)]
     secure: SecureFlags,
+
+    #[command(flatten)]
+    audit: AuditFlags,
 }
 
 impl Network {
@@ -306,6 +311,14 @@ impl Network {
         self.secure.settings(self.file())
     }
 
+    /// The audit log that flags or the settings file name; `None` if they name none.
+    ///
+    /// # Errors
+    /// An unreadable settings file, an invalid table, or a log that cannot be written.
+    pub fn audit(&self) -> Result<Option<AuditLog>, Failure> {
+        self.audit.log(self.file())
+    }
+
     /// Refuses a secure link, for a command that examines plain links only.
     ///
     /// # Errors
@@ -332,15 +345,22 @@ impl Network {
 
     /// The same, with further links.
     fn start_with(&self, config: Config, links: Vec<Box<dyn CustomLink>>) -> Result<Node, Failure> {
+        let log = self.audit()?;
         #[cfg(feature = "secure")]
-        if let Some(secure) = self.secure()? {
-            let config = Secure::restrict(config)?;
-            let link = secure.open(JausId::new(config.subsystem, config.node, 0))?;
-            let mut links = links;
-            links.push(Box::new(link));
-            return Node::start_with(config, links).map_err(Failure::of);
+        let (config, links) = match self.secure()? {
+            Some(secure) => {
+                let config = Secure::restrict(config)?;
+                let node = JausId::new(config.subsystem, config.node, 0);
+                let link: Box<dyn CustomLink> = Box::new(secure.open(node, log.clone())?);
+                (config, links.into_iter().chain([link]).collect())
+            }
+            None => (config, links),
+        };
+        let node = Node::start_with(config, links).map_err(Failure::of)?;
+        if let Some(log) = log {
+            node.record_decisions(PlainLinks(log));
         }
-        Node::start_with(config, links).map_err(Failure::of)
+        Ok(node)
     }
 
     /// The settings of the file, or the defaults.

@@ -14,7 +14,7 @@ use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, Ip, interface};
 use jaus::node::{Config, Tcp, units};
 use jaus::rights::Rules;
-use jaus_audit::{AuditLog, Limits};
+use jaus_audit::AuditLog;
 use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
 use serde::Deserialize;
 
@@ -110,10 +110,6 @@ pub struct SecureFlags {
     #[arg(long, value_name = "ADDRESS")]
     secure_peer: Vec<Address>,
 
-    /// Write an audit log to this file: sessions, refused messages, control, emergencies
-    #[arg(long, value_name = "FILE")]
-    secure_audit: Option<PathBuf>,
-
     /// At the first start, trust this key for these ids: NAME, KEY and IDS, separated by blanks
     /// (repeatable)
     ///
@@ -175,9 +171,6 @@ struct Table {
     authority: Option<PathBuf>,
     /// The authority's list of revoked certificates. Flag: `--revoked`.
     revoked: Option<PathBuf>,
-    /// The file of the audit log: sessions, refused messages, control, emergencies. Flag:
-    /// `--secure-audit`.
-    audit: Option<PathBuf>,
     /// JSIDL files or folders of messages of one's own, which state what their senders need. Flag:
     /// `--secure-jsidl`.
     jsidl: Vec<PathBuf>,
@@ -219,7 +212,6 @@ impl Beacons {
 pub struct Secure {
     listen: Option<Address>,
     peers: Vec<Address>,
-    audit: Option<PathBuf>,
     /// To be trusted at the first start.
     trust: Vec<Peer>,
     announce: Option<Interfaces>,
@@ -235,11 +227,13 @@ impl SecureFlags {
     /// # Errors
     /// An unreadable file, an invalid table, or a key to trust without a secure link.
     pub fn settings(&self, file: Option<&Path>) -> Result<Option<Secure>, Failure> {
-        let table: Table = file.map(settings::secure).transpose()?.unwrap_or_default();
+        let table: Table = file
+            .map(|file| settings::section(file, settings::SECURE))
+            .transpose()?
+            .unwrap_or_default();
         let secure = Secure {
             listen: self.secure_listen.or(table.listen),
             peers: [&table.peers[..], &self.secure_peer].concat(),
-            audit: self.secure_audit.clone().or(table.audit),
             trust: self.trust.clone(),
             announce: table.announce.interfaces(&self.secure_announce),
             budget: self.secure_budget.or(table.budget),
@@ -348,11 +342,11 @@ impl Secure {
         }
     }
 
-    /// Opens the link of this node, an id without a component.
+    /// Opens the link of this node, an id without a component. It writes to the log, if there is one.
     ///
     /// # Errors
     /// A key, certificate or trust file that cannot be used, or an address that cannot be listened on.
-    pub fn open(&self, node: JausId) -> Result<SecureLink, Failure> {
+    pub fn open(&self, node: JausId, log: Option<AuditLog>) -> Result<SecureLink, Failure> {
         trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
         let credentials = self.credentials()?;
         let any = || match self.peers.first() {
@@ -370,12 +364,11 @@ impl Secure {
         if let Some(Budget(octets)) = self.budget {
             settings = settings.budget(octets);
         }
-        let mut link = SecureLink::open_with(credentials, settings).map_err(Failure::of)?;
-        if let Some(path) = &self.audit {
-            let log = AuditLog::open(path, Limits::default()).map_err(Failure::of)?;
-            link = link.audited(log);
-        }
-        Ok(link)
+        let link = SecureLink::open_with(credentials, settings).map_err(Failure::of)?;
+        Ok(match log {
+            Some(log) => link.audited(log),
+            None => link,
+        })
     }
 }
 

@@ -19,7 +19,9 @@ const OWN: [&str; 5] = ["id", "name", "kind", "metrics", "log_level"];
 /// The table with the flags of a single-component program.
 const COMPONENT: &str = "component";
 /// The table with the settings of the secure link.
-const SECURE: &str = "secure";
+pub const SECURE: &str = "secure";
+/// The table with the settings of the audit log.
+pub const AUDIT: &str = "audit";
 
 /// Reads a settings file: identity and settings of the node.
 pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
@@ -27,17 +29,19 @@ pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     parse(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
 }
 
-/// The table `[secure]` of a settings file, or the default without one.
+/// A table of a settings file, or the default without one.
 ///
 /// # Errors
 /// An unreadable file, or an invalid table.
-#[cfg(feature = "secure")]
-pub fn secure<T: serde::de::DeserializeOwned + Default>(path: &Path) -> Result<T, Failure> {
+pub fn section<T: serde::de::DeserializeOwned + Default>(
+    path: &Path,
+    name: &str,
+) -> Result<T, Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     let read = || {
         let mut table = DeTable::parse(&text)?;
-        let secure = table.get_mut().remove(SECURE);
-        let read = secure.map(|secure| T::deserialize(toml::de::ValueDeserializer::from(secure)));
+        let section = table.get_mut().remove(name);
+        let read = section.map(|it| T::deserialize(toml::de::ValueDeserializer::from(it)));
         read.unwrap_or_else(|| Ok(T::default()))
     };
     read().map_err(|error: Error| {
@@ -110,13 +114,13 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
     let wrong = |error: Error| Mistake::of(&error, text);
     let table = DeTable::parse(text).map_err(wrong)?;
     let known = serde_json::to_value(Config::default()).unwrap_or_default();
-    let besides = [&OWN[..], &[COMPONENT, SECURE]].concat();
+    let besides = [&OWN[..], &[COMPONENT, SECURE, AUDIT]].concat();
     if let Some(unknown) = unknown_key(table.get_ref(), &known, &besides, "") {
         return Err(unknown.in_text(text));
     }
     let place = table.span();
     let mut table = table;
-    for other in [COMPONENT, SECURE] {
+    for other in [COMPONENT, SECURE, AUDIT] {
         table.get_mut().remove(other);
     }
     let is_own = |(key, _): &(Spanned<DeString<'_>>, _)| OWN.contains(&key.get_ref().as_ref());

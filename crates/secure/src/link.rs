@@ -308,6 +308,8 @@ impl CustomLink for SecureLink {
         }
         self.credentials
             .set_clock(SystemTime::UNIX_EPOCH + node::time_of_day());
+        let is_refusing = self.audit.as_ref().is_some_and(AuditLog::refuses_commands);
+        self.transport.refuse_commands(is_refusing);
         self.transport.handle_timeout(now);
         let beacons_wait = self.read_beacons(cx, now);
         if self.read(cx, now) || beacons_wait {

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
-use jaus_audit::{AuditLog, Limits};
+use jaus_audit::AuditLog;
 use jaus_cli::folders::{make_folder_of, service_folder};
 #[cfg(feature = "https")]
 use jaus_cli::https::HttpsFlags;
@@ -58,9 +58,9 @@ struct Flags {
     #[command(flatten)]
     https: HttpsFlags,
 
-    /// Log logins, and the requests that change vehicles, as JSON lines in this file
-    #[arg(long, value_name = "FILE")]
-    audit: Option<PathBuf>,
+    /// Logins, and the requests that change vehicles.
+    #[arg(skip)]
+    audit: Option<AuditLog>,
 
     /// A host name by which browsers reach this machine, besides its addresses (repeatable)
     #[arg(long, value_name = "NAME")]
@@ -87,6 +87,10 @@ impl Ready for Flags {
     const KIND: Kind = Kind::OperatorControlUnit;
     const SUBSYSTEM: &'static str = "Operator";
 
+    fn audit(&mut self, log: Option<AuditLog>) {
+        self.audit = log;
+    }
+
     fn part(self) -> Result<impl Part, Failure> {
         let token = self.token_file.as_deref().map(Token::read).transpose();
         let token = token.map_err(|error| Failure::new(format!("--token-file: {error}")))?;
@@ -99,7 +103,6 @@ impl Ready for Flags {
         }
         let base_map = self.map.as_deref().map(open_map).transpose()?;
         let users = self.users.as_deref().map(open_users).transpose()?;
-        let audit = self.audit.as_deref().map(open_audit).transpose()?;
         #[cfg(feature = "https")]
         let tls = self.https.open(&names(listen, &self.host))?;
         #[cfg(not(feature = "https"))]
@@ -114,7 +117,7 @@ impl Ready for Flags {
             state: state_folder(),
             users,
             tls,
-            audit,
+            audit: self.audit,
             hosts: self.host,
             base_map,
         }))
@@ -187,10 +190,6 @@ fn open_users(path: &Path) -> Result<UsersFile, Failure> {
         )));
     }
     Ok(file)
-}
-
-fn open_audit(path: &Path) -> Result<AuditLog, Failure> {
-    AuditLog::open(path, Limits::default()).map_err(Failure::of)
 }
 
 /// Names and addresses of the page, for a new certificate.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use futures_util::StreamExt;
-use jaus_audit::{AuditLog, Limits};
+use jaus_audit::{AuditLog, AuditSettings, refusals_of};
 use jaus_ocu::Station;
 use jaus_ocu::users::{self, PasswordHash, User, UserRole, UsersFile};
 use jaus_test_kit::waiting::{until, within_limit};
@@ -47,7 +47,7 @@ impl Guarded {
         let station = Station {
             users: Some(UsersFile::load(&file).unwrap()),
             state: Some(folder.path().to_owned()),
-            audit: Some(AuditLog::open(&log, Limits::default()).unwrap()),
+            audit: Some(AuditLog::open(&log, AuditSettings::default()).unwrap()),
             ..Station::default()
         };
         let scene = Scene::with(station, 0).await;
@@ -59,7 +59,11 @@ impl Guarded {
     }
 
     fn audit(&self) -> String {
-        std::fs::read_to_string(self.folder.path().join("audit.jsonl")).unwrap()
+        let evidence = self.folder.path().join("audit.jsonl");
+        let files = [refusals_of(&evidence), evidence];
+        files
+            .map(|file| std::fs::read_to_string(file).unwrap())
+            .concat()
     }
 
     /// Whether the audit log has an entry with these words.

@@ -77,6 +77,8 @@ pub struct Transport {
     credentials: Credentials,
     /// What messages need, for the rules of the peers.
     table: Table,
+    /// Whether what changes something is refused, because it could not be recorded.
+    is_refusing: bool,
     /// The edition of the trust with which the sessions were last compared.
     edition: u64,
     /// Why new sessions are refused, as last reported.
@@ -130,6 +132,7 @@ impl Transport {
         Self {
             own,
             table: Table::default(),
+            is_refusing: false,
             edition: credentials.trust_edition(),
             fault: None,
             own_edition,

@@ -2,7 +2,7 @@
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::rights::{Table, Unaccepted};
+use jaus::rights::{Table, Unaccepted, check_unrecorded};
 use jaus::wire::{Frame, judp};
 
 use crate::trust::Peer;
@@ -15,13 +15,23 @@ pub(super) struct Screened {
     pub(super) frames: Vec<(Frame, Result<(), Unaccepted>)>,
 }
 
-/// Screens a datagram from a peer; `None` if it is no JUDP.
-pub(super) fn incoming(peer: &Peer, table: &Table, octets: &Bytes) -> Option<Screened> {
+/// Screens a datagram from a peer; `None` if it is no JUDP. What changes something is refused if it cannot
+/// be recorded.
+pub(super) fn incoming(
+    peer: &Peer,
+    (table, can_record): (&Table, bool),
+    octets: &Bytes,
+) -> Option<Screened> {
     screen(octets, |frame| {
         if !peer.speaks_for(frame.source) {
             return Err(Unaccepted::Source);
         }
-        peer.rules.check(frame, table).map_err(Unaccepted::Rule)
+        let checked = peer.rules.check(frame, table);
+        let checked = checked.and_then(|()| match can_record {
+            true => Ok(()),
+            false => check_unrecorded(frame, table),
+        });
+        checked.map_err(Unaccepted::Rule)
     })
 }
 

@@ -87,6 +87,11 @@ impl Transport {
         }
     }
 
+    /// Whether to refuse what changes something, because it could not be recorded.
+    pub const fn refuse_commands(&mut self, is_refusing: bool) {
+        self.is_refusing = is_refusing;
+    }
+
     /// Reads the QUIC datagrams of a session.
     pub(super) fn read_datagrams(&mut self, now: Instant, id: SessionId) {
         let mut datagrams = Vec::new();
@@ -130,7 +135,8 @@ impl Transport {
             self.counters.add(Counter::NoticesReceived);
             return;
         }
-        let Some(screened) = screen::incoming(peer, &self.table, octets) else {
+        let Some(screened) = screen::incoming(peer, (&self.table, !self.is_refusing), octets)
+        else {
             self.counters.add(Counter::Malformed);
             return;
         };

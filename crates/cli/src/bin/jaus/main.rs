@@ -5,6 +5,7 @@
     reason = "they panic when the reader is gone; see `output`"
 )]
 
+mod audit;
 mod control;
 mod convert;
 mod debug_view;
@@ -85,6 +86,7 @@ enum Command {
     #[cfg(feature = "secure")]
     Keys(keys::Keys),
     Users(users::UsersCommand),
+    Audit(audit::AuditCommand),
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
@@ -131,6 +133,7 @@ impl Command {
             #[cfg(feature = "secure")]
             Self::Keys(keys) => keys.run(),
             Self::Users(users) => users.run(),
+            Self::Audit(audit) => audit.run(),
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),

@@ -93,7 +93,7 @@ fn on_secure_scene(body: impl Fn(Scene<'_>, &Path)) {
         let flags = [
             ("--key", key),
             ("--trusted-keys", trusted),
-            ("--secure-audit", audit),
+            ("--audit", audit),
         ]
         .map(|(flag, path)| format!("{flag}={}", path.display()));
         let flags: Vec<_> = flags

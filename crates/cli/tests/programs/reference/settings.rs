@@ -49,6 +49,12 @@ An authenticated, encrypted link to other nodes of this stack; [Secure links](se
 
 ";
 
+const AUDIT: &str = "## [audit]
+
+Who did what, and with what result; [the audit log](secure-links.md#the-audit-log) explains it.
+
+";
+
 const SYSTEM: &str = "## A system
 
 The file of `jaus up` names the programs of one machine: a section `[parts.NAME]` for each, and `[all]` for what
@@ -82,7 +88,9 @@ pub(super) fn page() -> String {
     }
     page.push_str(COMPONENT);
     page.push_str(SECURE);
-    write_secure(&mut page);
+    write_table(&mut page, "crates/cli/src/secure.rs");
+    page.push_str(AUDIT);
+    write_table(&mut page, "crates/cli/src/audit.rs");
     page.push_str("## Values\n\n");
     write_units(&mut page);
     for (name, (about, keys)) in &types.values {
@@ -212,9 +220,9 @@ fn with_settings_only(about: &str) -> String {
     kept
 }
 
-/// The keys of the secure link.
-fn write_secure(page: &mut String) {
-    let source = Source::read("crates/cli/src/secure.rs");
+/// The keys of a table that the program itself reads: of the secure link, or of the audit log.
+fn write_table(page: &mut String, file: &str) {
+    let source = Source::read(file);
     let Shape::Table(fields) = source.find("Table").unwrap().shape else {
         panic!("it has keys");
     };
@@ -227,6 +235,8 @@ fn write_secure(page: &mut String) {
             (_, "listen") => "address",
             (_, "budget") => "rate",
             (_, "announce") => "boolean, or list of interfaces",
+            (_, "unwritable") => "`\"go-on\"` or `\"refuse-commands\"`",
+            (_, "forward") => "`\"journald\"` or address",
             _ => "path",
         };
         let about = field.about.replace('\n', " ");

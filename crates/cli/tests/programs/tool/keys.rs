@@ -33,6 +33,14 @@ impl Host {
         path.to_str().unwrap().to_owned()
     }
 
+    /// The audit log: refusals, and then evidence.
+    fn audit(&self) -> String {
+        let files = ["audit-refused.jsonl", "audit.jsonl"].map(|name| self.file(name));
+        files
+            .map(|file| std::fs::read_to_string(file).unwrap())
+            .concat()
+    }
+
     fn flags(&self) -> [String; 2] {
         let [key, trusted] = ["node.key", "trusted_keys"].map(|name| self.file(name));
         [format!("--key={key}"), format!("--trusted-keys={trusted}")]
@@ -67,7 +75,7 @@ fn vehicle_and_operator(id: &str) -> (Running, Host, Host, String) {
     let listen = format!("--secure-listen={address}");
     let flags = at_vehicle.flags();
     let flags = flags.each_ref().map(String::as_str);
-    let audit = format!("--secure-audit={}", at_vehicle.file("audit.jsonl"));
+    let audit = format!("--audit={}", at_vehicle.file("audit.jsonl"));
     let own = ["--id", id, &listen, &audit];
     let mut vehicle = Running::command("vehicle", &[&own[..], &flags].concat());
     vehicle.read_until("Ctrl-C");
@@ -147,7 +155,7 @@ fn an_emergency_of_another_client_is_cleared_by_a_key_with_the_right_alone() {
     allow("viewer", &["observe", "except=SetEmergency"]);
     let refused = control(&viewer, "61.1.1", "emergency");
     assert_ne!(refused.status, 0, "{refused:?}");
-    let audit = std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    let audit = at_vehicle.audit();
     let entries: Vec<_> = audit.lines().filter(|it| it.contains("of all")).collect();
     let has = |result: &str| entries.iter().any(|it| it.contains(result));
     assert!(has("allowed") && has("refused"), "{audit}");
@@ -260,7 +268,7 @@ fn while_the_trust_file_is_broken_links_remain_and_no_other_key_gets_one() {
     std::fs::write(&path, format!("{good}half a line\n")).unwrap();
     // The vehicle reads the file within a second.
     block_until(|| status() == 1);
-    let audit = || std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    let audit = || at_vehicle.audit();
     block_until(|| audit().contains("new sessions are refused here until a file can be used"));
     let ended = r#""who":"operator","what":"disconnect""#;
     assert!(!audit().contains(ended), "the operator's link remains");
@@ -375,7 +383,7 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
     assert_eq!(sent.status, 0, "{sent:?}");
 
     drop(vehicle);
-    let audit = std::fs::read_to_string(at_vehicle.file("audit.jsonl")).unwrap();
+    let audit = at_vehicle.audit();
     for part in [
         r#""who":"operator","what":"connect","result":"allowed""#,
         r#""who":"operator","what":"RequestControl","to":"115.1.4","result":"refused","why":"its sender may not take control"#,

@@ -67,6 +67,23 @@ fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
 }
 
 #[test]
+fn what_cannot_be_recorded_is_refused_but_stops_are_not() {
+    let (mut network, ..) = vehicle_with_rules("control=127");
+    let request = message("60.1.1", "101.1.1", &RequestControl { authority_code: 1 });
+    let stop = message("60.1.1", "101.1.1", &SetEmergency::default());
+    network.hosts[0].transport.refuse_commands(true);
+    for datagram in [&request, &stop] {
+        network.send(1, Priority::Standard, datagram);
+    }
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, std::slice::from_ref(&stop));
+    network.hosts[0].transport.refuse_commands(false);
+    network.send(1, Priority::Standard, &request);
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, [stop, request]);
+}
+
+#[test]
 fn a_request_beyond_the_authority_of_a_key_is_denied_in_the_words_of_jaus() {
     let (mut network, ..) = vehicle_with_rules("control=127");
     let request = |authority_code| message("60.1.1", "101.1.1", &RequestControl { authority_code });

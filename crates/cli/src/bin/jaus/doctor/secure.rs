@@ -25,7 +25,7 @@ pub(super) async fn check(secure: &Secure, node: JausId, time: Duration) -> Vec<
     if findings.iter().any(Finding::is_problem) {
         return findings;
     }
-    let mut link = match secure.open(node) {
+    let mut link = match secure.open(node, None) {
         Ok(link) => link,
         Err(error) => {
             findings.push(Finding::problem(CHECK, error).advice(

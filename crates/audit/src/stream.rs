@@ -1,0 +1,127 @@
+//! Evidence or refusals: a file of its own, in which no client takes more than its share.
+
+use std::io;
+use std::path::Path;
+use std::time::Instant;
+
+use jaus_limits::{Buckets, Rate};
+
+use crate::entry::{Entry, Outcome};
+use crate::file::{Limits, LogFile};
+use crate::repeats::Repeats;
+
+/// Different entries about one client at one address: a burst, and then one each second. What is allowed to
+/// everybody, such as releases to ever new ids, fills no log.
+const SHARE: Rate = Rate::new(1, 200);
+/// Clients with a share of their own. Others have one together.
+const MOST_CLIENTS: usize = 256;
+
+/// One of the two files of a log.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    file: LogFile,
+    repeats: Repeats,
+    shares: Buckets<String>,
+    /// Entries beyond the share of their client.
+    beyond: u64,
+    /// The outcome of the lines about them.
+    outcome: Outcome,
+}
+
+impl Stream {
+    pub(crate) fn open(path: &Path, limits: Limits, outcome: Outcome) -> io::Result<Self> {
+        Ok(Self {
+            file: LogFile::open(path, limits)?,
+            repeats: Repeats::default(),
+            shares: Buckets::new(SHARE, MOST_CLIENTS),
+            beyond: 0,
+            outcome,
+        })
+    }
+
+    /// Appends an entry, or counts it. Returns it if it was appended.
+    pub(crate) fn note<'e>(
+        &mut self,
+        now: Instant,
+        entry: &'e Entry,
+    ) -> io::Result<Option<&'e Entry>> {
+        if !self.repeats.is_new(now, entry) {
+            return Ok(None);
+        }
+        if !self.takes_share(now, entry) {
+            self.beyond += 1;
+            return Ok(None);
+        }
+        self.file.append(entry)?;
+        Ok(Some(entry))
+    }
+
+    fn takes_share(&mut self, now: Instant, entry: &Entry) -> bool {
+        // Who has proved a key has one share, wherever it connects from.
+        let address = entry.address.as_deref().unwrap_or_default();
+        let client = match &entry.key {
+            Some(key) => key.clone(),
+            None => format!("{} {address}", entry.who),
+        };
+        self.shares.take(now, client)
+    }
+
+    /// What was counted until now; all of it without a time.
+    pub(crate) fn counted(&mut self, until: Option<Instant>) -> Vec<Entry> {
+        let due = self.repeats.due();
+        let is_due = until.is_none_or(|now| due.is_some_and(|due| due <= now));
+        let mut counted = self.repeats.take(until);
+        if is_due && self.beyond > 0 {
+            let why = "more different entries of one client at once than are listed";
+            let entry = Entry::new("several", "various", self.outcome).because(why);
+            counted.push(entry.times(std::mem::take(&mut self.beyond)));
+        }
+        counted
+    }
+
+    /// Appends an entry of the log itself.
+    pub(crate) fn append(&mut self, entry: &Entry) -> io::Result<()> {
+        self.file.append(entry)
+    }
+
+    /// Waits until the disk has what was appended.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.file.sync()
+    }
+
+    /// When the next counted repetitions are due.
+    pub(crate) fn due(&self) -> Option<Instant> {
+        self.repeats.due()
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_client_takes_no_more_than_its_share_and_others_keep_theirs() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.jsonl");
+        let open = || Stream::open(&path, Limits::default(), Outcome::Allowed);
+        let (mut stream, start) = (open().unwrap(), Instant::now());
+        for index in 0..10_000 {
+            let release = Entry::new("tablet", "ReleaseControl", Outcome::Allowed);
+            let entry = release.to(index).address(format_args!("10.0.0.2:{index}"));
+            stream.note(start, &entry.key("key of the tablet")).unwrap();
+        }
+        let evidence = Entry::new("console", "RequestControl", Outcome::Allowed);
+        assert!(stream.note(start, &evidence).unwrap().is_some());
+        let counted = stream.counted(Some(start + Duration::from_secs(10)));
+        let beyond = counted.iter().find(|it| it.who == "several").unwrap();
+        assert_eq!(beyond.times, 9800);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.lines().count(), 201);
+    }
+}

@@ -1,0 +1,336 @@
+//! Verifies the chain of a log, across its full files.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::chain::{ChainEnd, LineHash, Seal};
+use crate::file::full;
+
+/// A chain without a break.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VerifiedLog {
+    /// The files, the oldest first.
+    pub files: Vec<PathBuf>,
+    /// The number of the first line that is there. Lines before it were in files that are gone.
+    pub first: u64,
+    /// The number of the last line. Nothing in the log tells whether lines after it were cut off: compare
+    /// it, and its hash, with what was noted elsewhere.
+    pub last: u64,
+    /// The hash of the last line.
+    pub hash: LineHash,
+    /// Incomplete lines, of which the next lines have the hashes: the program was interrupted.
+    pub incomplete: u64,
+}
+
+/// Why a log is not verified.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerifyError {
+    /// A file cannot be read.
+    #[error("{}: {source}", .file.display())]
+    File {
+        /// The file.
+        file: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The chain is broken.
+    #[error("{}:{line}: {broken}", .file.display())]
+    Broken {
+        /// The file.
+        file: PathBuf,
+        /// The line of the file, from 1.
+        line: usize,
+        /// What is wrong there.
+        broken: BrokenChain,
+    },
+    /// The log is shorter than it was.
+    #[error("the log ends with line {last}: line {noted} with the noted hash is missing")]
+    CutOff {
+        /// The number of the last line.
+        last: u64,
+        /// The number that was noted.
+        noted: u64,
+    },
+}
+
+/// What is wrong with a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BrokenChain {
+    /// Lines before it are missing.
+    #[error("lines {first} to {last} are missing before this one")]
+    Missing {
+        /// The number of the first missing line.
+        first: u64,
+        /// The number of the last.
+        last: u64,
+    },
+    /// The line before was changed, or replaced, or inserted.
+    #[error("the line before was changed: its hash is not the one that this line has")]
+    Changed,
+    /// The line itself is no line of a log.
+    #[error("this is no line of an audit log, and the next line does not have its hash")]
+    Unreadable,
+    /// A line has the number of another one.
+    #[error("this line has number {number}, but {expected} follows")]
+    Number {
+        /// Its number.
+        number: u64,
+        /// The number that is due.
+        expected: u64,
+    },
+    /// A line with the noted number has another hash than the noted one.
+    #[error("this line was changed: it had another hash when it was noted")]
+    Noted,
+}
+
+/// Verifies a log: the file, and its full files beside it. `noted` is the number and the hash of a line
+/// that an earlier verification reported: the log must still have it.
+///
+/// # Errors
+/// A file that cannot be read, or the first break.
+pub fn verify(path: &Path, noted: Option<(u64, &str)>) -> Result<VerifiedLog, VerifyError> {
+    let mut check = Check {
+        log: VerifiedLog::default(),
+        before: None,
+        torn: None,
+        noted,
+    };
+    for file in files(path) {
+        check.file(file)?;
+    }
+    check.end()
+}
+
+/// The files of a log, the oldest first. A gap in their numbers is a gap in the chain.
+fn files(path: &Path) -> Vec<PathBuf> {
+    /// No log has more files: those in between may be missing.
+    const MOST: u32 = 1000;
+    let full = (1..=MOST).rev().map(|number| full(path, number));
+    let mut files: Vec<_> = full.filter(|file| file.exists()).collect();
+    files.push(path.to_owned());
+    files
+}
+
+struct Check<'n> {
+    log: VerifiedLog,
+    /// The line before; `None` at the first.
+    before: Option<ChainEnd>,
+    /// An incomplete line, until the next one tells its hash.
+    torn: Option<(PathBuf, usize)>,
+    noted: Option<(u64, &'n str)>,
+}
+
+impl Check<'_> {
+    fn file(&mut self, file: PathBuf) -> Result<(), VerifyError> {
+        let content = fs::read(&file).map_err(|source| VerifyError::File {
+            file: file.clone(),
+            source,
+        })?;
+        let content = content.strip_suffix(b"\n").unwrap_or(&content);
+        let lines = content.split(|&octet| octet == b'\n').enumerate();
+        for (index, line) in lines.filter(|_| !content.is_empty()) {
+            let place = (file.clone(), index + 1);
+            let seal = Seal::of(line);
+            let number = seal.as_ref().map(|it| it.number);
+            match seal {
+                Some(seal) => self.line(place, &seal, LineHash::of(line))?,
+                None if self.torn.is_some() => return Err(self.unreadable(place)),
+                None => self.torn = Some(place),
+            }
+            let before = self.before.map_or(0, |it| it.number);
+            self.before = Some(ChainEnd {
+                number: number.unwrap_or(before),
+                hash: LineHash::of(line),
+            });
+        }
+        self.log.files.push(file);
+        Ok(())
+    }
+
+    fn line(
+        &mut self,
+        (file, line): (PathBuf, usize),
+        seal: &Seal,
+        hash: LineHash,
+    ) -> Result<(), VerifyError> {
+        let number = seal.number;
+        // The first line that is there may follow others, which were in files that are gone.
+        let is_first = self.before.is_none() && number != 1;
+        let before = self.before.unwrap_or_default();
+        let is_chained = is_first || seal.after == before.hash.to_string();
+        let expected = before.number + 1;
+        if !is_chained && self.torn.is_some() {
+            return Err(self.unreadable((file, line)));
+        }
+        let broken = if number > expected && !is_first {
+            Some(BrokenChain::Missing {
+                first: expected,
+                last: number - 1,
+            })
+        } else if !is_chained {
+            Some(BrokenChain::Changed)
+        } else if number != expected && !is_first {
+            Some(BrokenChain::Number { number, expected })
+        } else if self.is_other_than_noted(number, hash) {
+            Some(BrokenChain::Noted)
+        } else {
+            None
+        };
+        if let Some(broken) = broken {
+            return Err(VerifyError::Broken { file, line, broken });
+        }
+        self.log.incomplete += u64::from(self.torn.take().is_some());
+        if self.log.first == 0 {
+            self.log.first = number;
+        }
+        (self.log.last, self.log.hash) = (number, hash);
+        Ok(())
+    }
+
+    fn is_other_than_noted(&self, number: u64, hash: LineHash) -> bool {
+        self.noted
+            .is_some_and(|(noted, was)| noted == number && was != hash.to_string())
+    }
+
+    /// The error about the incomplete line, if there is one, or about this place.
+    fn unreadable(&mut self, place: (PathBuf, usize)) -> VerifyError {
+        let (file, line) = self.torn.take().unwrap_or(place);
+        let broken = BrokenChain::Unreadable;
+        VerifyError::Broken { file, line, broken }
+    }
+
+    fn end(mut self) -> Result<VerifiedLog, VerifyError> {
+        // Nothing follows that has its hash: the program was interrupted just now.
+        self.log.incomplete += u64::from(self.torn.take().is_some());
+        if let Some((noted, _)) = self.noted
+            && noted > self.log.last
+        {
+            let last = self.log.last;
+            return Err(VerifyError::CutOff { last, noted });
+        }
+        Ok(self.log)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::entry::{Entry, Outcome};
+    use crate::file::{Limits, LogFile};
+
+    /// A log of so many lines, about three in a file, and of several starts.
+    fn log(lines: usize) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("audit.jsonl");
+        for index in 0..lines {
+            let limits = Limits { file: 600, kept: 9 };
+            let mut file = LogFile::open(&path, limits).unwrap();
+            let entry = Entry::new("console", format!("act {index}"), Outcome::Allowed);
+            file.append(&entry).unwrap();
+        }
+        (folder, path)
+    }
+
+    fn edit(file: &Path, change: impl Fn(&mut Vec<String>)) {
+        let text = fs::read_to_string(file).unwrap();
+        let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
+        change(&mut lines);
+        fs::write(file, lines.join("\n") + "\n").unwrap();
+    }
+
+    fn broken(path: &Path) -> String {
+        let error = verify(path, None).unwrap_err().to_string();
+        error.rsplit('/').next().unwrap().to_owned()
+    }
+
+    #[test]
+    fn the_chain_goes_on_across_files_and_starts() {
+        let (_folder, path) = log(10);
+        let verified = verify(&path, None).unwrap();
+        assert!(verified.files.len() > 2, "{verified:?}");
+        assert_eq!((verified.first, verified.last), (1, 10));
+        assert_eq!(verified.incomplete, 0);
+        // The oldest file may be removed, as by rotation.
+        fs::remove_file(&verified.files[0]).unwrap();
+        let verified = verify(&path, None).unwrap();
+        assert!(verified.first > 1 && verified.last == 10, "{verified:?}");
+    }
+
+    #[test]
+    fn the_first_changed_or_missing_line_is_named() {
+        let (_folder, path) = log(10);
+        let oldest = verify(&path, None).unwrap().files[0].clone();
+        let text = fs::read_to_string(&oldest).unwrap();
+        assert_eq!(text.lines().count(), 3, "{text}");
+        let name = oldest.file_name().unwrap().to_str().unwrap().to_owned();
+        edit(&oldest, |lines| {
+            lines[0] = lines[0].replace("console", "nobody")
+        });
+        assert!(broken(&path).starts_with(&format!("{name}:2: the line before was changed")));
+        fs::write(&oldest, &text).unwrap();
+        edit(&oldest, |lines| drop(lines.remove(1)));
+        let missing = format!("{name}:2: lines 2 to 2 are missing");
+        assert!(broken(&path).starts_with(&missing), "{}", broken(&path));
+        fs::write(&oldest, &text).unwrap();
+        edit(&oldest, |lines| lines.insert(1, lines[0].clone()));
+        assert!(broken(&path).starts_with(&format!("{name}:2: ")));
+        fs::write(&oldest, &text).unwrap();
+        edit(&oldest, |lines| lines[1].truncate(20));
+        assert!(broken(&path).starts_with(&format!("{name}:2: this is no line")));
+        fs::write(&oldest, &text).unwrap();
+        verify(&path, None).unwrap();
+    }
+
+    #[test]
+    fn a_missing_file_between_others_is_named_by_its_lines() {
+        let (_folder, path) = log(10);
+        let files = verify(&path, None).unwrap().files;
+        fs::remove_file(&files[1]).unwrap();
+        let error = broken(&path);
+        assert!(error.contains(":1: lines 4 to 6 are missing"), "{error}");
+    }
+
+    #[test]
+    fn a_cut_off_end_is_found_by_a_noted_line_alone() {
+        let (_folder, path) = log(10);
+        let before = verify(&path, None).unwrap();
+        let hash = before.hash.to_string();
+        let noted = Some((before.last, &*hash));
+        verify(&path, noted).unwrap();
+        fs::write(&path, "").unwrap();
+        assert!(verify(&path, None).is_ok(), "nothing in the log tells");
+        let error = verify(&path, noted).unwrap_err().to_string();
+        assert!(
+            error.contains("line 10 with the noted hash is missing"),
+            "{error}"
+        );
+        // The program goes on, with other lines of the same numbers.
+        for _ in 0..4 {
+            let mut file = LogFile::open(&path, Limits::default()).unwrap();
+            let entry = Entry::new("console", "another act", Outcome::Allowed);
+            file.append(&entry).unwrap();
+        }
+        let error = verify(&path, noted).unwrap_err().to_string();
+        assert!(error.contains("another hash when it was noted"), "{error}");
+    }
+
+    #[test]
+    fn an_interrupted_line_is_covered_by_the_next_one() {
+        let (_folder, path) = log(2);
+        let mut text = fs::read_to_string(&path).unwrap();
+        text.push_str(r#"{"time":"2026-11-2"#);
+        fs::write(&path, text).unwrap();
+        assert_eq!(verify(&path, None).unwrap().incomplete, 1);
+        let mut file = LogFile::open(&path, Limits::default()).unwrap();
+        let entry = Entry::new("console", "another act", Outcome::Allowed);
+        file.append(&entry).unwrap();
+        let verified = verify(&path, None).unwrap();
+        assert_eq!((verified.incomplete, verified.last), (1, 3));
+        edit(&path, |lines| lines[2].push('x'));
+        assert!(broken(&path).starts_with("audit.jsonl:3: this is no line"));
+    }
+}

@@ -1,0 +1,125 @@
+//! Flags and settings of the audit log, which all parts of a program share.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use clap::{Args, ValueEnum};
+use jaus::endpoint::{Decided, Remote};
+use jaus::node::DecisionRecorder;
+use jaus_audit::{AuditLog, AuditSettings, Entry, ForwardError, ForwardTo, Unwritable};
+use serde::Deserialize;
+
+use super::failure::Failure;
+use super::settings;
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Audit log")]
+#[expect(
+    missing_docs,
+    reason = "it would become the help text of the struct that flattens it"
+)]
+pub struct AuditFlags {
+    /// Append who did what, and with what result, as JSON lines to this file: refused messages,
+    /// control, emergencies, sessions of secure links, logins and requests of the page
+    #[arg(long, value_name = "FILE")]
+    audit: Option<PathBuf>,
+
+    /// While the audit log cannot be written, go on, or refuse commands and requests for control
+    /// [default: go-on]
+    #[arg(long, value_name = "WHAT")]
+    audit_unwritable: Option<WhenUnwritable>,
+
+    /// Forward the entries of the audit log as well: to journald, or by syslog (RFC 5424, UDP) to this
+    /// address, by default to port 514
+    #[arg(long, value_name = "PLACE")]
+    audit_forward: Option<ForwardTo>,
+
+    /// The log, once it is open.
+    #[arg(skip)]
+    log: OnceLock<AuditLog>,
+}
+
+/// The table `[audit]` of a settings file.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Table {
+    /// The file of the audit log: refused messages, control, emergencies, sessions of secure links, logins
+    /// and requests of the page. Flag: `--audit`.
+    file: Option<PathBuf>,
+    /// What happens while the log cannot be written, such as on a full disk: `"go-on"`, with an error in
+    /// the program's log, or `"refuse-commands"`: only queries and stops are accepted then. Flag:
+    /// `--audit-unwritable`.
+    unwritable: Option<WhenUnwritable>,
+    /// Where entries go besides: `"journald"`, or the address of a syslog server (RFC 5424, UDP), such as
+    /// `"10.0.0.5:514"`. Flag: `--audit-forward`.
+    forward: Option<Place>,
+}
+
+/// What happens while the log cannot be written.
+#[derive(Debug, Clone, Copy, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+enum WhenUnwritable {
+    GoOn,
+    RefuseCommands,
+}
+
+/// A place to forward to.
+#[derive(Debug, Deserialize)]
+#[serde(try_from = "String")]
+struct Place(ForwardTo);
+
+impl TryFrom<String> for Place {
+    type Error = ForwardError;
+
+    fn try_from(text: String) -> Result<Self, ForwardError> {
+        text.parse().map(Self)
+    }
+}
+
+impl AuditFlags {
+    /// The log that flags or the settings file name; `None` if they name none. It is opened once.
+    ///
+    /// # Errors
+    /// An unreadable settings file, an invalid table, or a log that cannot be written.
+    pub fn log(&self, settings: Option<&Path>) -> Result<Option<AuditLog>, Failure> {
+        if let Some(log) = self.log.get() {
+            return Ok(Some(log.clone()));
+        }
+        let table: Table = settings
+            .map(|file| settings::section(file, settings::AUDIT))
+            .transpose()?
+            .unwrap_or_default();
+        let Some(path) = self.audit.clone().or(table.file) else {
+            return Ok(None);
+        };
+        let unwritable = match self.audit_unwritable.or(table.unwritable) {
+            Some(WhenUnwritable::RefuseCommands) => Unwritable::RefuseCommands,
+            Some(WhenUnwritable::GoOn) | None => Unwritable::GoOn,
+        };
+        let forward = table.forward.map(|Place(place)| place);
+        let settings = AuditSettings::default()
+            .unwritable(unwritable)
+            .forward(self.audit_forward.clone().or(forward));
+        let log = AuditLog::open(&path, settings).map_err(Failure::of)?;
+        Ok(Some(self.log.get_or_init(|| log).clone()))
+    }
+}
+
+/// The records of plain links in the log.
+pub(super) struct PlainLinks(pub(super) AuditLog);
+
+impl DecisionRecorder for PlainLinks {
+    fn record(&mut self, decided: Decided) {
+        // Nobody has proved who sent it.
+        let entry = Entry::of("plain link", &decided.decision).times(decided.times);
+        self.0.write(match decided.client {
+            // With its port, each attempt of a flood would be an entry of its own.
+            Remote::Socket(address) => entry.address(address.ip()),
+            other => entry.address(other),
+        });
+    }
+
+    fn refuses_commands(&self) -> bool {
+        self.0.refuses_commands()
+    }
+}
