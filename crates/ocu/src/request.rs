@@ -1,11 +1,23 @@
 //! Messages from a page: requests for the vehicle, and settings of the connection.
 
+use bytes::Bytes;
 use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::messages::core::{
+    ClearEmergency, ReleaseControl, RequestControl, Resume, SetEmergency, Standby,
+};
+use jaus::messages::mobility::SetWrenchEffort;
+use jaus::rights::{CLEAR_ALL, Table};
+use jaus::wire;
+use jaus_vehicle::messages::ground::{
+    ApproveMission, ContinueMission, SetDestination, StopMission,
+};
+use jaus_vehicle::messages::handoff::ConfirmReleaseControl;
 use serde::Deserialize;
 
 use super::page_link::Seen;
 use super::press::Press;
-use super::users::UserRole;
+use super::users::{PageRights, UserRole};
 
 /// One frame from a page.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -159,6 +171,16 @@ pub enum OperatorRequest {
     Stop,
 }
 
+/// A message, or nothing, which no rules allow.
+fn encoded(message: &impl Message) -> Bytes {
+    message.encode().unwrap_or_default()
+}
+
+/// A message of which the code alone matters.
+fn of_code(code: u16) -> Bytes {
+    Bytes::copy_from_slice(&code.to_le_bytes())
+}
+
 /// The frames that pages send most often, as arrays.
 #[derive(Deserialize)]
 #[serde(untagged)]
@@ -211,15 +233,63 @@ impl OperatorRequest {
         )
     }
 
-    /// The role that it needs, at a station with users or one with a token alone.
-    pub(crate) const fn needs(&self, has_users: bool) -> UserRole {
+    /// Whether it ends what moves a vehicle or controls it.
+    pub(crate) const fn is_end(&self) -> bool {
+        matches!(
+            self,
+            Self::Control { on: false } | Self::Standby | Self::DriveEnd | Self::Stop
+        )
+    }
+
+    /// The least role that may send the messages to which it leads.
+    pub(crate) fn needs(&self, rights: PageRights) -> UserRole {
+        let table = Table::default();
+        let messages = self.messages(rights.authority);
+        let may = |role: &UserRole| {
+            let rules = role.rules(rights);
+            let mut messages = messages.iter();
+            messages.all(|message| {
+                let frame = wire::Frame::new(JausId::EVERYONE, JausId::EVERYONE, message.clone());
+                rules.check(&frame, &table).is_ok()
+            })
+        };
+        let [.., most] = UserRole::ALL;
+        UserRole::ALL.into_iter().find(may).unwrap_or(most)
+    }
+
+    /// The messages to which it leads, for the table of what messages need.
+    fn messages(&self, authority_code: u8) -> Vec<Bytes> {
+        let clear = |code: u16| {
+            encoded(&ClearEmergency {
+                emergency_code: code.into(),
+            })
+        };
         match self {
-            // Selecting is looking at another vehicle.
-            Self::Select { .. } => UserRole::Observe,
-            _ if self.is_stop() => UserRole::Observe,
+            // It is looking at another vehicle.
+            Self::Select { .. } => Vec::new(),
+            // The control is the station's, and so all users': who ends it must be allowed to take it.
+            Self::Control { .. } => vec![
+                encoded(&RequestControl { authority_code }),
+                encoded(&ReleaseControl),
+            ],
+            Self::Handover { .. } => vec![encoded(&ConfirmReleaseControl::default())],
+            Self::Resume => vec![encoded(&Resume)],
+            Self::Standby => vec![encoded(&Standby)],
+            Self::Emergency { on: true } | Self::EmergencyAll { on: true } => {
+                vec![encoded(&SetEmergency::default())]
+            }
+            Self::Emergency { on: false } | Self::EmergencyAll { on: false } => vec![clear(1)],
             // Who has stopped the vehicle may have seen what this user does not see.
-            Self::ClearAnyEmergency if has_users => UserRole::Administer,
-            _ => UserRole::Drive,
+            Self::ClearAnyEmergency => vec![clear(CLEAR_ALL)],
+            Self::Drive { .. } | Self::DriveEnd => vec![encoded(&SetWrenchEffort::default())],
+            Self::TakeOver => vec![
+                encoded(&StopMission),
+                encoded(&RequestControl { authority_code }),
+            ],
+            Self::Destination { .. } => vec![of_code(SetDestination::CODE)],
+            Self::Approve { .. } => vec![of_code(ApproveMission::CODE)],
+            Self::Continue { .. } => vec![of_code(ContinueMission::CODE)],
+            Self::Stop => vec![encoded(&StopMission)],
         }
     }
 
@@ -395,6 +465,54 @@ mod tests {
             ..MessageFilter::default()
         };
         assert_eq!(frame.said, Said::Messages { on: true, filter });
+    }
+
+    #[test]
+    fn a_role_may_what_its_rules_allow() {
+        let rights = |authority, has_users| PageRights {
+            authority,
+            has_users,
+        };
+        let part = JausId::new(101, 3, 36);
+        let (operator, grant) = (JausId::new(43, 1, 1), true);
+        for (request, role) in [
+            (
+                OperatorRequest::Select { subsystem: 101 },
+                UserRole::Observe,
+            ),
+            (OperatorRequest::Emergency { on: true }, UserRole::Observe),
+            (
+                OperatorRequest::EmergencyAll { on: true },
+                UserRole::Observe,
+            ),
+            (OperatorRequest::Emergency { on: false }, UserRole::Drive),
+            (OperatorRequest::EmergencyAll { on: false }, UserRole::Drive),
+            (OperatorRequest::ClearAnyEmergency, UserRole::Administer),
+            (OperatorRequest::Control { on: true }, UserRole::Drive),
+            (OperatorRequest::Control { on: false }, UserRole::Drive),
+            (
+                OperatorRequest::Handover {
+                    part,
+                    operator,
+                    grant,
+                },
+                UserRole::Drive,
+            ),
+            (OperatorRequest::Resume, UserRole::Drive),
+            (OperatorRequest::Standby, UserRole::Drive),
+            (OperatorRequest::DriveEnd, UserRole::Drive),
+            (OperatorRequest::TakeOver, UserRole::Drive),
+            (OperatorRequest::Approve { mission: 1 }, UserRole::Drive),
+            (OperatorRequest::Continue { mission: 1 }, UserRole::Drive),
+            (OperatorRequest::Stop, UserRole::Drive),
+        ] {
+            for authority in [0, 200, 255] {
+                assert_eq!(request.needs(rights(authority, true)), role, "{request:?}");
+            }
+        }
+        // Who has the token alone is the only user.
+        let clear = OperatorRequest::ClearAnyEmergency;
+        assert_eq!(clear.needs(rights(200, false)), UserRole::Drive);
     }
 
     #[test]

@@ -342,8 +342,8 @@ impl Reader<'_> {
             seen,
         };
         let reply = self.recorded(id, vehicle, request);
-        if !self.visitor.may(UserRole::Drive) {
-            return reply(Err(self.why_not(UserRole::Drive)));
+        if let Err(why) = self.visitor.check(&request, &self.shared.admission) {
+            return reply(Err(why));
         }
         let order = DriveOrder {
             page: self.page,
@@ -367,9 +367,8 @@ impl Reader<'_> {
     ) {
         let reply = self.recorded(id, vehicle, request);
         let may_drive = self.visitor.may(UserRole::Drive);
-        let needed = request.needs(self.shared.admission.gate.users().is_some());
-        if !self.visitor.may(needed) {
-            return reply(Err(self.why_not(needed)));
+        if let Err(why) = self.visitor.check(&request, &self.shared.admission) {
+            return reply(Err(why));
         }
         let access = &self.shared.access;
         // On error the session has ended, which the writer notices.
@@ -435,17 +434,6 @@ impl Reader<'_> {
     }
 
     /// Why the visitor may not do what needs this role.
-    fn why_not(&self, needed: UserRole) -> String {
-        if self.shared.admission.gate.users().is_none() {
-            return "this requires the token that jaus-ocu printed or read from its file"
-                .to_owned();
-        }
-        format!(
-            "this requires the role {needed}; {} does not have it",
-            self.visitor.user
-        )
-    }
-
     /// The callback that reports the result of a request to the page. Without an id, only refusals
     /// are reported, at a limited rate.
     fn reply(&mut self, id: Option<u64>) -> Reply {

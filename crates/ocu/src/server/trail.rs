@@ -22,6 +22,11 @@ impl Trail {
         Self { log, operator }
     }
 
+    /// Whether what changes something is to be refused, because it could not be recorded.
+    pub(super) fn refuses_commands(&self) -> bool {
+        self.log.as_ref().is_some_and(AuditLog::refuses_commands)
+    }
+
     fn write(&self, entry: impl FnOnce() -> Entry) {
         if let Some(log) = &self.log {
             log.write(entry().id(self.operator));

@@ -3,10 +3,13 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use jaus::rights::Refusal;
 use jaus_view::places::Place;
 
+use super::Admission;
 use super::logins::LoginId;
-use crate::users::UserRole;
+use crate::request::OperatorRequest;
+use crate::users::{PageRights, UserRole};
 
 /// Who uses a page or sends a request, and with which role.
 #[derive(Debug)]
@@ -44,6 +47,38 @@ impl Visitor {
 
     pub(super) fn role(&self) -> Option<UserRole> {
         *self.role.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Checks a request by the role.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub(super) fn check(
+        &self,
+        request: &OperatorRequest,
+        admission: &Admission,
+    ) -> Result<(), String> {
+        let has_users = admission.gate.users().is_some();
+        let needed = request.needs(PageRights {
+            authority: admission.authority,
+            has_users,
+        });
+        if !self.may(needed) {
+            return Err(match has_users {
+                true => format!(
+                    "this requires the role {needed}; {} does not have it",
+                    self.user
+                ),
+                false => {
+                    "this requires the token that jaus-ocu printed or read from its file".to_owned()
+                }
+            });
+        }
+        let is_change = needed > UserRole::Observe && !request.is_end();
+        if is_change && admission.trail.refuses_commands() {
+            return Err(Refusal::Unrecorded.to_string());
+        }
+        Ok(())
     }
 
     /// The visitor has shown the token.

@@ -16,6 +16,7 @@ mod password;
 use std::fmt;
 use std::str::FromStr;
 
+use jaus::rights::Rules;
 use serde::Serialize;
 
 pub use self::edit::{add, remove};
@@ -37,6 +38,19 @@ pub enum UserRole {
 impl UserRole {
     /// All roles, from the least to the most.
     pub const ALL: [Self; 3] = [Self::Observe, Self::Drive, Self::Administer];
+
+    /// What users of this role may send through a station, in the words of the permission table.
+    pub(crate) fn rules(self, rights: PageRights) -> Rules {
+        let mut rules = Rules::default();
+        if self >= Self::Drive {
+            rules.control = Some(rights.authority);
+            rules.clear_emergency = true;
+        }
+        // Who has the token alone is the only user.
+        rules.clear_any_emergency =
+            self >= Self::Administer || self >= Self::Drive && !rights.has_users;
+        rules
+    }
 
     const fn name(self) -> &'static str {
         match self {
@@ -60,6 +74,15 @@ impl FromStr for UserRole {
         let known = Self::ALL.into_iter().find(|it| it.name() == text);
         known.ok_or_else(|| UsersError::Role(text.chars().take(40).collect()))
     }
+}
+
+/// What a station gives its roles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PageRights {
+    /// The authority with which it takes control.
+    pub(crate) authority: u8,
+    /// Whether users log in; else there is one, who has the token.
+    pub(crate) has_users: bool,
 }
 
 /// A user of the page.
