@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{LinkId, Path, Received};
+use jaus::rights::Acceptance;
 use jaus::wire::ra::{Fields, Header, PREFIX};
 use jaus::wire::{Acknowledgement, Broadcast, Priority};
 use jaus_fuzz::message;
@@ -44,6 +45,8 @@ fuzz_target!(|octets: &[u8]| {
     settings.ra.carrier.max_message = 16_384;
     settings.ra.max_components = 16;
     settings.ra.queue_limit = 32;
+    let all = "65535.255.255 control=255 clear-emergency=any configure also=any";
+    settings.grants = Acceptance::new([all.parse().expect("a grant")]);
     let mut story = Story {
         gateway: Gateway::new(GATEWAY, settings).expect("sound settings"),
         now: *START,

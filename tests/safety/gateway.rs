@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
+use jaus::rights::Acceptance;
 use jaus_ra::carrier::To;
 use jaus_ra::convert::to_ra;
 use jaus_ra::gateway::{Action, Gateway, Settings};
@@ -57,7 +58,12 @@ impl Crossing {
     }
 
     fn with(now: Instant, operator: Operator) -> Self {
-        let mut gateway = Gateway::new(GATEWAY, Settings::default()).expect("a subsystem of RA's");
+        let all = "65535.255.255 control=255".parse().expect("a grant");
+        let settings = Settings {
+            grants: Acceptance::new([all]),
+            ..Settings::default()
+        };
+        let mut gateway = Gateway::new(GATEWAY, settings).expect("a subsystem of RA's");
         gateway.start(now);
         Self {
             gateway,

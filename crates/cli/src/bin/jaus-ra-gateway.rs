@@ -11,6 +11,8 @@ use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::link::{Group, STANDARD_PORT};
 use jaus::node::{Config, units};
+use jaus::rights::{Acceptance, Grant};
+use jaus_audit::AuditLog;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::{control_timeout, duration};
 use jaus_cli::{Failure, Ready, launch};
@@ -61,6 +63,10 @@ struct Flags {
 
     #[command(flatten)]
     ids: Ids,
+
+    /// What RA components may and may not do.
+    #[arg(skip)]
+    audit: Option<AuditLog>,
 }
 
 #[derive(Args)]
@@ -82,6 +88,14 @@ struct RaNetwork {
     /// other multicast messages by unicast (repeatable)
     #[arg(long, value_name = "ADDRESS")]
     ra_peer: Vec<Ipv4Addr>,
+
+    /// What RA components may send to JAUS components, by the JAUS ids that they have here: "20
+    /// control=127" or "65535.255.255 observe"; the first that matches counts, and others are refused
+    /// (repeatable) [default: all may query and subscribe]
+    ///
+    /// RA systems prove no ids. `jaus keys trust --help` has the words.
+    #[arg(long, value_name = "IDS RULES")]
+    ra_grant: Vec<Grant>,
 
     /// Our UDP port there; RA systems always answer to 3794
     #[arg(long, value_name = "PORT", default_value_t = STANDARD_PORT)]
@@ -163,6 +177,7 @@ impl Ready for Flags {
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ra-gateway --interface eth0                  both networks on one cable\n  \
         jaus-ra-gateway --interface eth0 --ra-interface eth1\n  \
+        jaus-ra-gateway --interface eth0 --ra-grant \"20 control=127\"   RA subsystem 20 may drive\n  \
         jaus-ra-gateway --interface eth0 --framing judp   for JUDP_Interface: true\n  \
         jaus-ra-gateway --interface eth0 --ra-peer 10.1.2.3   beyond a router\n  \
         jaus-ra-gateway --interface eth0 --ra-offset 1000 RA subsystem 20 becomes 1020\n  \
@@ -181,6 +196,10 @@ impl Ready for Flags {
         }
     }
 
+    fn audit(&mut self, log: Option<AuditLog>) {
+        self.audit = log;
+    }
+
     fn part(self) -> Result<impl Part, Failure> {
         let reporter = match self.json {
             true => print_json,
@@ -197,6 +216,7 @@ impl Ready for Flags {
             port: self.ra.ra_port,
             reports: self.stats,
             reporter,
+            audit: self.audit,
         })
     }
 }
@@ -212,6 +232,9 @@ impl Flags {
         };
         if !self.show.is_empty() {
             settings.show = Show::Only(self.show.iter().copied().collect());
+        }
+        if !self.ra.ra_grant.is_empty() {
+            settings.grants = Acceptance::new(self.ra.ra_grant.iter().cloned());
         }
         let peers = self.ra.ra_peer.iter().copied();
         settings.ra.carrier.peers = peers.map(Into::into).collect();

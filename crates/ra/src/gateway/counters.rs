@@ -30,6 +30,8 @@ counters! {
     NoCounterpart = "refused: no counterpart on the other side",
     /// Refused: a value that the other side cannot represent, or a malformed body.
     NotConverted = "refused: not expressible on the other side",
+    /// Refused: an RA component may not send it to JAUS components.
+    NotGranted = "refused: RA component has no right to it",
     /// Refused: a command of a client that is not in control.
     NotInControl = "refused: sender not in control",
     /// Refused: a command for an RA component in the emergency state.
@@ -56,6 +58,8 @@ counters! {
     Collision = "hidden: subsystem number taken on the other side",
     /// Not shown: too many components.
     TooManyComponents = "hidden: too many components",
+    /// Decisions that an audit log lacks, because too many different ones came at once.
+    DecisionsLost = "decisions not recorded",
     /// Not sent: the RA node rejected the message.
     NotSent = "not sent to RA",
 }

@@ -25,6 +25,7 @@ mod picture;
 mod proxy;
 mod registry;
 mod report;
+mod rights;
 mod roles;
 mod running;
 mod settings;
@@ -50,6 +51,7 @@ use crate::message::Message;
 use crate::node::{self, RaNode};
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
+use jaus::rights::DecisionQueue;
 use jaus::service::{
     Change, Discovery, Event, Kind, Liveness, Profile, Scope, Stack, Timing, Transport,
 };
@@ -78,6 +80,7 @@ pub struct Gateway {
     /// RA numbers of the shown subsystems, by JAUS number.
     shown: BTreeMap<u16, u8>,
     actions: VecDeque<Action>,
+    decisions: DecisionQueue<RaId>,
     tally: Tally,
 }
 
@@ -144,6 +147,7 @@ impl Gateway {
             former: BTreeMap::new(),
             shown: BTreeMap::new(),
             actions: VecDeque::new(),
+            decisions: DecisionQueue::default(),
             tally: Tally::default(),
         })
     }
@@ -192,6 +196,7 @@ impl Gateway {
         if message.to == self.own_stack.id() {
             self.own_stack.handle_message(now, message);
         } else {
+            self.record_answer(now, message);
             self.with_front(now, message.to, |proxy, tally| {
                 proxy.handle_message(now, message, tally);
             });

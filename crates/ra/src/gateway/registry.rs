@@ -177,19 +177,26 @@ impl Gateway {
             proxy.hear_subsystem(heard);
         }
         act(&mut proxy, &mut self.tally);
-        while let Some(event) = proxy.stack.poll_event() {
-            match event {
-                Event::Message(message) => self.handle_unasked(now, &mut proxy, &message),
-                event => proxy.handle_event(now, event, &mut self.tally),
-            }
+        self.handle_events(now, &mut proxy);
+        for denial in self.pass_on(now, &mut proxy) {
+            proxy.handle_message(now, &denial, &mut self.tally);
         }
-        while let Some(message) = proxy.poll_transmit() {
-            self.actions.push_back(Action::Send(message));
-        }
+        self.handle_events(now, &mut proxy);
+        // What is denied again is not answered again: the RA client knows.
+        drop(self.pass_on(now, &mut proxy));
         for message in proxy.take_said() {
             self.send_ra(now, &message);
         }
         self.proxies.insert(id, proxy);
+    }
+
+    fn handle_events(&mut self, now: Instant, proxy: &mut Proxy) {
+        while let Some(event) = proxy.stack.poll_event() {
+            match event {
+                Event::Message(message) => self.handle_unasked(now, proxy, &message),
+                event => proxy.handle_event(now, event, &mut self.tally),
+            }
+        }
     }
 
     /// Handles a JAUS message to an RA component that is no answer to a query.

@@ -19,6 +19,7 @@ use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
 use jaus::node::{Node, Port, Resident, now, sleep_until};
 use jaus::wire::Priority;
+use jaus_audit::{AuditLog, Entry};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// Configuration of a running gateway between RA systems and JAUS.
@@ -52,6 +53,8 @@ pub struct RaGateway {
     pub reports: Option<Duration>,
     /// Receiver of the reports.
     pub reporter: fn(&Report),
+    /// The log of what RA components may and may not do.
+    pub audit: Option<AuditLog>,
 }
 
 impl RaGateway {
@@ -73,6 +76,7 @@ impl Default for RaGateway {
             port: STANDARD_PORT,
             reports: None,
             reporter: |report| tracing::info!("{}", report.line()),
+            audit: None,
         }
     }
 }
@@ -103,6 +107,7 @@ impl Part for RaGateway {
             node,
             reports: self.reports,
             reporter: self.reporter,
+            audit: self.audit,
         }));
         let Some(running) = &mut running.0 else {
             return Err(PartError::NodeStopped);
@@ -171,6 +176,7 @@ struct Running {
     node: Node,
     reports: Option<Duration>,
     reporter: fn(&Report),
+    audit: Option<AuditLog>,
 }
 
 /// A received datagram or message.
@@ -252,6 +258,12 @@ impl Running {
     }
 
     fn carry_out(&mut self) {
+        while let Some(decided) = self.gateway.poll_decision() {
+            if let Some(log) = &self.audit {
+                let who = format_args!("RA {}", decided.client);
+                log.write(Entry::of(who, &decided.decision).times(decided.times));
+            }
+        }
         while let Some(transmit) = self.gateway.poll_transmit() {
             let (link, datagram) = (&mut self.link, &transmit.datagram);
             match transmit.to {

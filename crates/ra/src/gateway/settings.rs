@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use jaus::rights::Acceptance;
+
 use crate::{ids, node};
 
 /// The settings of a [`Gateway`](super::Gateway).
@@ -25,6 +27,8 @@ pub struct Settings {
     pub max_components: usize,
     /// How long changes of a JAUS subsystem are collected before RA systems are notified.
     pub gather: Duration,
+    /// What RA components may send to JAUS components, by their JAUS ids. Others than these are not heard.
+    pub grants: Acceptance,
     /// Settings of the RA node.
     pub ra: node::Settings,
 }
@@ -61,6 +65,7 @@ impl Default for Settings {
             timeout: Duration::from_secs(4),
             max_components: 253,
             gather: Duration::from_millis(300),
+            grants: Acceptance::default(),
             ra: node::Settings::default(),
         }
     }

@@ -21,7 +21,14 @@ impl Gateway {
     /// Starts it on a host, with RA systems behind an interface.
     pub(crate) fn start(host: &str, interface: &str, flags: &[&str], stdout: Stdio) -> Self {
         let mut command = on_host(host, env!("CARGO_BIN_EXE_jaus-ra-gateway"));
-        command.args(["--interface", interface]).args(flags);
+        let grant = [
+            "--ra-grant",
+            "65535.255.255 control=255 clear-emergency=any",
+        ];
+        command
+            .args(["--interface", interface])
+            .args(grant)
+            .args(flags);
         Self(command.stdout(stdout).spawn().unwrap())
     }
 

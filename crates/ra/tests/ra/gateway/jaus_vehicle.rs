@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
+use jaus::rights::{Acceptance, Refusal, Unaccepted, Verdict};
 use jaus::service::{Kind, Management, Service, Stack, State};
 use jaus_ra::gateway::{Counter, Settings, Show};
 use jaus_ra::node::Event;
@@ -39,6 +40,61 @@ fn world_with(settings: Settings) -> (World, usize, usize) {
     let rover = world.add_jaus(vehicle());
     world.run(Duration::from_secs(10));
     (world, ra, rover)
+}
+
+/// A gateway with these grants for RA components, an RA operator and a JAUS vehicle.
+fn world_granting(grants: Acceptance) -> (World, usize) {
+    let mut world = World::closed(Settings {
+        grants,
+        ..Settings::default()
+    });
+    let ra = world.add_ra(subsystem(30, "OCU", &[(32, 1, "Commander")]), None);
+    world.add_jaus(vehicle());
+    world.run(Duration::from_secs(10));
+    (world, ra)
+}
+
+fn decisions(world: &mut World) -> Vec<(RaId, String, Verdict)> {
+    let decided = std::iter::from_fn(|| world.gateway.poll_decision());
+    decided
+        .map(|it| (it.client, it.decision.what, it.decision.verdict))
+        .collect()
+}
+
+#[test]
+fn without_a_grant_an_ra_client_looks_and_neither_controls_nor_stops() {
+    let (mut world, ra) = world_granting(Acceptance::default());
+    world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
+    world.run(Duration::from_secs(1));
+    assert_eq!(world.ra_heard(ra, 0x4402).len(), 1);
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(2));
+    assert_eq!(world.ra_heard(ra, 0x0010).len(), 1, "it is answered");
+    let decided = decisions(&mut world);
+    let refused = Verdict::Refused(Unaccepted::Rule(Refusal::Control));
+    let expected = (COMMANDER, "RequestControl".to_owned(), refused);
+    assert!(decided.contains(&expected), "{decided:?}");
+    assert!(
+        !decided.iter().any(|it| it.2 == Verdict::Granted),
+        "{decided:?}"
+    );
+}
+
+#[test]
+fn a_grant_gives_an_ra_client_control_and_both_are_recorded() {
+    let grants = ["30 control=127", "65535.255.255 observe"].map(|it| it.parse().unwrap());
+    let (mut world, ra) = world_granting(Acceptance::new(grants));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(2));
+    assert_eq!(world.ra_heard(ra, 0x000F)[0].data[0], 0);
+    let decided = decisions(&mut world);
+    for (what, verdict) in [
+        ("RequestControl", Verdict::Passed),
+        ("ConfirmControl", Verdict::Granted),
+    ] {
+        let expected = (COMMANDER, what.to_owned(), verdict);
+        assert!(decided.contains(&expected), "{decided:?}");
+    }
 }
 
 fn world() -> (World, usize, usize) {

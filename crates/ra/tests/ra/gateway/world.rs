@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
+use jaus::rights::Acceptance;
 use jaus::service::{
     Discovery, Event, Inquiry, Kind, Liveness, Patience, Profile, Scope, Service, Stack, Timing,
     Transport,
@@ -84,12 +85,25 @@ pub(crate) fn stack(id: JausId, kind: Kind, name: &str, services: Vec<Box<dyn Se
     Stack::new(discovery, all)
 }
 
+/// Every message of every RA component.
+fn everything() -> Acceptance {
+    let all = "65535.255.255 control=255 clear-emergency=any configure also=any";
+    Acceptance::new([all.parse().unwrap()])
+}
+
 impl World {
+    /// A gateway whose RA components may send everything.
+    pub(crate) fn new(settings: Settings) -> Self {
+        let grants = everything();
+        Self::closed(Settings { grants, ..settings })
+    }
+
+    /// The same, but RA components may do no more than these settings say.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time starts at any instant"
     )]
-    pub(crate) fn new(settings: Settings) -> Self {
+    pub(crate) fn closed(settings: Settings) -> Self {
         let now = Instant::now();
         let mut gateway = Gateway::new(GATEWAY, settings).unwrap();
         gateway.start(now);
@@ -108,7 +122,11 @@ impl World {
 
     /// Starts a gateway with the same id in place of a killed one.
     pub(crate) fn restart_gateway(&mut self) {
-        self.gateway = Gateway::new(GATEWAY, Settings::default()).unwrap();
+        let settings = Settings {
+            grants: everything(),
+            ..Settings::default()
+        };
+        self.gateway = Gateway::new(GATEWAY, settings).unwrap();
         self.attached.clear();
         self.gateway.start(self.now);
         self.power = Power::On;

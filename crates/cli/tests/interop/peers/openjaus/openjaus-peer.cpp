@@ -288,7 +288,7 @@ void run(const std::string& cable)
     })] = "the simulator";
     parts[child([&] {
         execlp("jaus-ra-gateway", "jaus-ra-gateway", "--interface", cable.c_str(), "--ra-interface",
-               OUTER_LINK.c_str(), nullptr);
+               OUTER_LINK.c_str(), "--ra-grant", "65535.255.255 control=255 clear-emergency=any", nullptr);
         throw failure("jaus-ra-gateway");
     })] = "the gateway";
     wait_until([] { return tree().find("PrimitiveDriver") != std::string::npos; }, "the simulator is not listed");
