@@ -22,6 +22,14 @@ pub(super) fn entry(record: Record) -> Entry {
             let why = "the key may not speak for this id";
             entry.id(source).to(destination).because(why)
         }
+        Act::DisputedId {
+            source,
+            destination,
+        } => {
+            let entry = Entry::new(who, "message", Outcome::Refused);
+            let why = "another program with the same key uses this id";
+            entry.id(source).to(destination).because(why)
+        }
         Act::Message {
             name,
             source,

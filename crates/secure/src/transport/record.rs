@@ -43,6 +43,13 @@ pub enum Act {
         /// The destination.
         destination: JausId,
     },
+    /// A message came from an id that another program with the same key uses.
+    DisputedId {
+        /// The id.
+        source: JausId,
+        /// The destination.
+        destination: JausId,
+    },
     /// A message was refused; or it concerns control, an emergency or the configuration of a
     /// component, and was passed to it.
     Message {
@@ -73,6 +80,7 @@ impl Act {
             self,
             Self::HandshakeFailed(_)
                 | Self::ForeignId { .. }
+                | Self::DisputedId { .. }
                 | Self::Message {
                     refusal: Some(_),
                     ..

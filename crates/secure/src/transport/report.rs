@@ -34,6 +34,10 @@ jaus::counters! {
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.
     ForeignIds = "dropped: id that the key of its sender may not use",
+    /// Messages refused because another program with the same key uses their id, and is alive.
+    DisputedIds = "dropped: id that another program with the same key uses",
+    /// Sessions refused because their key had too many.
+    TooManyInstances = "sessions refused: too many programs with one key",
     /// Messages refused by the [rules](jaus::rights::Rules) of the key of their sender.
     RuleForbids = "dropped: forbidden by the rules of its sender",
     Malformed = "dropped: not JUDP",

@@ -7,6 +7,7 @@
 mod beacons;
 mod budget;
 mod floods;
+mod instances;
 
 use std::collections::BTreeMap;
 

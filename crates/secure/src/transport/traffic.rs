@@ -11,6 +11,7 @@ use jaus::rights::{Permission, denial_of_control, is_recorded};
 use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
+use super::instances::HELLO;
 use super::record::{Act, Record};
 use super::screen::{self, Stop};
 use super::session::Session;
@@ -145,7 +146,20 @@ impl Transport {
             self.counters.add(Counter::NoticesReceived);
             return;
         }
-        let Some(screened) = screen::incoming(peer, &self.table, octets) else {
+        if octets.first() == Some(&HELLO) {
+            self.handle_hello(now, id, octets);
+            return;
+        }
+        let Some(octets) = self.undisputed(now, id, octets) else {
+            return;
+        };
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let Some(peer) = session.established() else {
+            return;
+        };
+        let Some(screened) = screen::incoming(peer, &self.table, &octets) else {
             self.counters.add(Counter::Malformed);
             return;
         };
@@ -205,7 +219,13 @@ impl Transport {
 
     /// Tells the peer what was refused: in the words of JAUS if it asked for control, and in a
     /// notice.
-    fn answer_refusal(&mut self, now: Instant, id: SessionId, frame: &Frame, sentence: &str) {
+    pub(super) fn answer_refusal(
+        &mut self,
+        now: Instant,
+        id: SessionId,
+        frame: &Frame,
+        sentence: &str,
+    ) {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
