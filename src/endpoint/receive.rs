@@ -15,7 +15,7 @@ use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
-use crate::rights::Table;
+use crate::rights::Admitted;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
 
 impl Endpoint {
@@ -148,7 +148,13 @@ impl Endpoint {
         let seen = self.heard.fingerprint(frame);
         self.refuse_own(arrival, seen)?;
         self.refuse_misplaced(arrival)?;
-        self.refuse_without_right(arrival)?;
+        if let Some(copies) = self.refuse_without_right(arrival)?.copies(frame) {
+            // A copy may be for nobody here, and another one for somebody.
+            let accepted = copies
+                .iter()
+                .map(|frame| self.accept(Arrival { frame, ..arrival }, sink));
+            return accepted.reduce(Result::or).unwrap_or(Ok(()));
+        }
         let passes = self.is_passed_on(frame);
         let is_for_us = match self.check_receivers(frame, broadcast) {
             Err(_) if passes => false,
@@ -188,7 +194,7 @@ impl Endpoint {
         }
         // Check before learning: a copy that arrived on another path must not move the peer.
         let novelty = match self.recall(arrival, seen) {
-            Novelty::Repeated { .. } if self.reassembly.awaits(frame) => Novelty::New,
+            Novelty::Repeated { .. } if self.reassembly.awaits(frame, path) => Novelty::New,
             novelty => novelty,
         };
         if novelty != Novelty::New {
@@ -260,13 +266,15 @@ impl Endpoint {
     }
 
     /// Refuses messages that their senders may not send. They are not acknowledged.
-    fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+    fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<Admitted, Counter> {
         let (frame, path) = (arrival.frame, arrival.path);
-        let Err(reason) = self.config.access.check_rights(frame, path.peer) else {
-            return Ok(());
+        let reason = match self.config.access.admit(frame, path.peer) {
+            Ok(admitted) => return Ok(admitted),
+            Err(reason) => reason,
         };
         if self.warnings.is_due(arrival.now, Warning::NotGranted) {
-            let (id, name) = (frame.source, Table::default().name_of(&frame.payload));
+            let table = &self.config.access.table;
+            let (id, name) = (frame.source, table.name_of(&frame.payload));
             warn!(%id, from = %path.peer, "refused {name}: {reason} (`access.grants`)");
         }
         Err(Counter::NotGranted)
@@ -315,7 +323,7 @@ impl Endpoint {
         };
         let is_single = frame.flags.data() == DataControl::Single;
         let large = if is_single {
-            self.reassembly.finish(source, frame.sequence)
+            self.reassembly.finish(frame, path)
         } else {
             let style = self.peers.large_style(source);
             let inserted = self.reassembly.insert(arrival, style, &mut self.counters)?;

@@ -21,6 +21,7 @@ use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
 use super::log_level::LogLevel;
+use super::permissions::table_with;
 #[cfg(feature = "secure")]
 use super::secure::{Secure, SecureFlags};
 use super::settings;
@@ -87,6 +88,11 @@ pub struct Network {
     #[arg(long, value_name = "IDS RULES")]
     grant: Vec<Grant>,
 
+    /// Decide on messages of one's own, too, by what the JSIDL file or directory states of them: for
+    /// --grant, as --secure-jsidl for secure links (repeatable)
+    #[arg(long, value_name = "PATH")]
+    grant_jsidl: Vec<PathBuf>,
+
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]
     #[arg(
@@ -97,7 +103,7 @@ pub struct Network {
         default_missing_value = "default",
         conflicts_with_all = [
             "interface", "loopback", "port", "group", "ttl", "peer", "allow", "deny", "bind",
-            "grant",
+            "grant", "grant_jsidl",
         ],
     )]
     attach: Option<Address>,
@@ -376,6 +382,8 @@ impl Network {
         }
         node.access.bind.extend(&self.bind);
         node.access.grants.extend_from_slice(&self.grant);
+        node.access.jsidl.extend_from_slice(&self.grant_jsidl);
+        node.access.table = table_with(&node.access.jsidl)?;
         #[cfg(unix)]
         if self.junior.is_some() {
             node.junior.clone_from(&self.junior);

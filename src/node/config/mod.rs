@@ -308,6 +308,7 @@ impl Config {
         }
         limits::validate(&self.routing, &self.limits)?;
         self.delivery.validate()?;
+        self.access.verify_grants()?;
         Ok(self.udp().validate()?)
     }
 

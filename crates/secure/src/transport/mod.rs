@@ -16,6 +16,7 @@
 mod admission;
 mod dial;
 mod egress;
+mod fragments;
 mod inlet;
 mod instances;
 mod parameters;
@@ -56,6 +57,7 @@ use crate::trust::TrustFile;
 use admission::{Admission, MOST_RESPONSES};
 use dial::Dial;
 use egress::Budget;
+use fragments::Fragments;
 use instances::Instance;
 use session::Session;
 use tokens::Tokens;
@@ -99,6 +101,8 @@ pub struct Transport {
     handles: HashMap<ConnectionHandle, SessionId>,
     next: u64,
     arrivals: VecDeque<Arrival>,
+    /// The unfinished messages of all sessions.
+    fragments: Fragments,
     /// Answers outside of connections.
     responses: VecDeque<(SocketAddr, Bytes)>,
     /// How many of them were sent since the connections had their turn.
@@ -151,6 +155,7 @@ impl Transport {
             handles: HashMap::new(),
             next: 0,
             arrivals: VecDeque::new(),
+            fragments: Fragments::default(),
             responses: VecDeque::new(),
             responded: 0,
             records: VecDeque::new(),
@@ -164,7 +169,9 @@ impl Transport {
     /// Decides by this table what messages need; without it by the catalogue's.
     #[must_use]
     pub fn with_table(self, table: Table) -> Self {
-        Self { table, ..self }
+        let transport = Self { table, ..self };
+        transport.verify_rules();
+        transport
     }
 
     /// Its counters so far.
@@ -427,6 +434,7 @@ impl Transport {
             self.arrivals.push_back(Arrival::Closed(id));
         }
         session.ended = true;
+        self.fragments.forget(id);
         let was_good = session.peer.is_some();
         for dial in &mut self.dials {
             if dial.session == Some(id) {

@@ -40,6 +40,8 @@ jaus::counters! {
     TooManyInstances = "sessions refused: too many programs with one key",
     /// Messages refused by the [rules](jaus::rights::Rules) of the key of their sender.
     RuleForbids = "dropped: forbidden by the rules of its sender",
+    /// Fragments that continue no message which their session began, and which its rules allow.
+    StrayFragments = "dropped: fragment of a message that its session did not begin",
     Malformed = "dropped: not JUDP",
     /// Messages not sent to a peer because the rules separate it from their source.
     Separated = "not sent: rules separate source and peer",

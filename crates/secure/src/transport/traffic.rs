@@ -8,7 +8,7 @@ use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
 use jaus::messages::core::RequestControl;
 use jaus::rights::{Permission, denial_of_control, is_recorded};
-use jaus::wire::{Frame, Priority, judp};
+use jaus::wire::{DataControl, Frame, Priority, judp};
 use quinn_proto::StreamId;
 
 use super::instances::HELLO;
@@ -71,7 +71,7 @@ impl Transport {
                 screen::may_pass(frame.source, &origins, to)
             };
             let passes = is_addressed && (!has_limits || is_open());
-            passes.then_some(()).ok_or(Stop::ForeignId)
+            passes.then_some(true).ok_or(Stop::ForeignId)
         })?;
         let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
         self.counters.add_many(Counter::Separated, stopped as u64);
@@ -89,7 +89,11 @@ impl Transport {
         };
         for frame in frames.map_while(Result::ok) {
             let (component, client) = (frame.source, frame.destination);
-            if let Some(Permission::Answer { is_granted }) = self.table.permission(&frame.payload)
+            let answer = self.table.needs(&frame.payload).find_map(|it| match it {
+                Permission::Answer { is_granted } => Some(is_granted),
+                _ => None,
+            });
+            if let Some(is_granted) = answer
                 && let Some(session) = self.sessions.get_mut(&id)
                 && session.requests.answer(component, client, is_granted)
             {
@@ -167,11 +171,29 @@ impl Transport {
         for (frame, decision) in &screened.frames {
             self.handle_decision(now, id, frame, *decision);
         }
-        if let Some(octets) = screened.passed {
+        let is_part = |frame: &Frame| frame.flags.data() != DataControl::Single;
+        let has_parts = screened.frames.iter().any(|(frame, _)| is_part(frame));
+        let passed = match screened.passed {
+            Some(datagram) if has_parts => self.continued(id, &datagram),
+            passed => passed,
+        };
+        for octets in passed.into_iter().chain(screened.narrowed) {
             let session = id;
             self.arrivals
                 .push_back(Arrival::Datagram { session, octets });
         }
+    }
+
+    /// A datagram without later fragments that continue no message of this session.
+    fn continued(&mut self, id: SessionId, datagram: &Bytes) -> Option<Bytes> {
+        let mut stopped = 0;
+        let screened = screen::screen(datagram, |frame| {
+            let passes = self.fragments.admit(id, frame);
+            stopped += u64::from(!passes);
+            Ok(passes)
+        })?;
+        self.counters.add_many(Counter::StrayFragments, stopped);
+        screened.passed
     }
 
     fn handle_decision(
@@ -191,7 +213,8 @@ impl Transport {
         };
         match decision {
             Ok(()) if is_recorded(frame, &table) => {
-                if let Some(Permission::Control { .. }) = table.permission(&frame.payload)
+                let is_request = |it| matches!(it, Permission::Control { .. });
+                if table.needs(&frame.payload).any(is_request)
                     && let Some(session) = self.sessions.get_mut(&id)
                 {
                     session.requests.add(destination, source);
