@@ -323,6 +323,12 @@ impl Secure {
         self.peers.iter().map(|Address(peer)| *peer).collect()
     }
 
+    /// Whether the link connects to peers, and several programs may have the same settings at once.
+    pub fn only_dials(&self) -> bool {
+        let is_dialling = !self.peers.is_empty() && self.announce.is_none();
+        is_dialling && self.listen.is_none() && self.audit.is_none()
+    }
+
     /// The node's settings beside the link: plain JUDP and JTCP only on interfaces that they name.
     ///
     /// # Errors
