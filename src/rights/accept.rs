@@ -110,6 +110,13 @@ impl Acceptance {
         grant_of(&self.0, id).is_some()
     }
 
+    /// Whether no id may do more than [`Rules::watch`] allows, so that nothing is gained by the id of
+    /// another one.
+    #[must_use]
+    pub fn only_watches(&self) -> bool {
+        self.0.iter().all(|grant| grant.rules.only_watch())
+    }
+
     /// Checks a message; the table tells what it needs.
     ///
     /// # Errors
@@ -240,6 +247,23 @@ mod tests {
         }
         let error = "60 drive".parse::<Grant>().unwrap_err().to_string();
         assert!(error.contains("control=AUTHORITY"), "{error}");
+    }
+
+    #[test]
+    fn a_grant_that_lets_an_id_do_anything_is_told_from_those_that_let_it_watch() {
+        assert!(Acceptance::default().only_watches());
+        assert!(acceptance(&["60 except=SetEmergency", "61 except=0006h"]).only_watches());
+        for more in [
+            "60 observe",
+            "60 except=SetEmergency command",
+            "60 except=SetEmergency control=0",
+            "60 except=SetEmergency clear-emergency",
+            "60 except=SetEmergency configure",
+            "60 except=SetEmergency also=D103h",
+        ] {
+            let both = acceptance(&["61 except=SetEmergency", more]);
+            assert!(!both.only_watches(), "{more}");
+        }
     }
 
     #[test]

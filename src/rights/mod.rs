@@ -174,6 +174,18 @@ impl Rules {
         }
     }
 
+    /// Whether they allow no more than [`watch`](Self::watch).
+    #[must_use]
+    pub fn only_watch(&self) -> bool {
+        let everywhere = Self {
+            with: Vec::new(),
+            only: Selection::default(),
+            except: Selection::default(),
+            ..self.clone()
+        };
+        everywhere == Self::default() && self.except.contains(SetEmergency::CODE)
+    }
+
     /// Checks a frame from the sender; the table tells what messages need. Later fragments pass: without
     /// the first one they are nothing.
     ///
