@@ -104,6 +104,9 @@ pub struct Message {
     /// The right that its sender needs: the attributes `permission`, `authority` and `granted` of our own
     /// namespace. `None` if the definition does not state it.
     pub permission: Option<Permission>,
+    /// The field with the component to which its receiver sends the message behind it, of the messages that
+    /// it carries: the attribute `destination` of our own namespace. `None` if the receiver obeys them itself.
+    pub destination: Option<String>,
     /// The author's text, white space folded.
     pub description: String,
     /// Fields between the code and the body. `None` for the usual header, whose only field is the

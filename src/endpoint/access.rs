@@ -8,6 +8,7 @@
 use std::fmt;
 use std::net::IpAddr;
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use ipnet::IpNet;
@@ -15,7 +16,7 @@ use ipnet::IpNet;
 use super::{Counter, Remote};
 use crate::address::{JausId, ParseIdError};
 use crate::as_text::serde_as_text;
-use crate::rights::{self, Grant, Table, Unaccepted};
+use crate::rights::{self, Admitted, Grant, GrantError, Table, Unaccepted};
 use crate::wire::Frame;
 
 /// Allow and deny lists. Deny wins over allow. If an allow list is not empty, everything that is
@@ -53,6 +54,13 @@ pub struct Access {
     /// is on the network and forges one has its rights, unless [`bind`](Self::bind) keeps it out.
     /// Secure links are exempt, because they have rules for each key. Flag: `--grant`.
     pub grants: Vec<Grant>,
+    /// JSIDL files or folders of messages of one's own, which state what their senders need, for `grants`. The
+    /// programs read them into [`table`](Self::table). Flag: `--grant-jsidl`.
+    pub jsidl: Vec<PathBuf>,
+    /// What messages need, for `grants`: by default the table of the catalogue. A program that knows further
+    /// definitions replaces it.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub table: Table,
 }
 
 impl Access {
@@ -84,15 +92,30 @@ impl Access {
         }
     }
 
-    /// Checks what a message needs that comes from this remote end.
+    /// Checks what a message needs that comes from this remote end, and says to which ids it may go.
     ///
     /// # Errors
     /// Why it is refused.
-    pub fn check_rights(&self, frame: &Frame, from: Remote) -> Result<(), Unaccepted> {
+    pub fn admit(&self, frame: &Frame, from: Remote) -> Result<Admitted, Unaccepted> {
         if self.grants.is_empty() || matches!(from, Remote::Session(_)) {
-            return Ok(());
+            return Ok(Admitted::Whole);
         }
-        rights::check_by_grants(&self.grants, frame, &Table::default())
+        rights::admit_by_grants(&self.grants, frame, &self.table)
+    }
+
+    /// Checks the words of all grants against the table: names that no definition has, and rights that have
+    /// no effect on plain links. Grants that do not pass give no more than they would without the word.
+    ///
+    /// # Errors
+    /// The first grant that is wrong.
+    pub fn verify_grants(&self) -> Result<(), GrantError> {
+        let mut grants = self.grants.iter();
+        grants.try_for_each(|grant| {
+            if grant.rules.clear_any_emergency {
+                return Err(GrantError::ClearAny(grant.to_string()));
+            }
+            Ok(grant.rules.verify(&self.table)?)
+        })
     }
 
     /// Adds an entry to the allow list of its kind.
@@ -299,6 +322,32 @@ mod tests {
 
     fn subsystems(texts: &[&str]) -> Vec<Subsystems> {
         texts.iter().map(|text| text.parse().unwrap()).collect()
+    }
+
+    #[test]
+    fn words_that_have_no_effect_on_plain_links_and_unknown_names_are_errors() {
+        let access = |grant: &str| Access {
+            grants: vec![grant.parse().unwrap()],
+            ..Access::default()
+        };
+        let verified = |grant: &str| access(grant).verify_grants().map_err(|it| it.to_string());
+        assert_eq!(
+            verified("60 control=99 clear-emergency only=PrimitiveDriver"),
+            Ok(())
+        );
+        let error = verified("60 clear-emergency=any").unwrap_err();
+        assert!(error.contains("has no effect on plain links"), "{error}");
+        let error = verified("60 command only=SetLamp").unwrap_err();
+        assert!(error.contains("`SetLamp` is not a service"), "{error}");
+        let mut with_lamp = access("60 command only=SetLamp");
+        with_lamp.table = Table::default().with("D103 command SetLamp").unwrap();
+        assert!(with_lamp.verify_grants().is_ok());
+        let frame = |octets: &'static [u8]| {
+            let (source, to) = (JausId::new(60, 1, 1), JausId::new(101, 1, 1));
+            Frame::new(source, to, bytes::Bytes::from_static(octets))
+        };
+        assert!(with_lamp.admit(&frame(b"\x03\xD1"), Remote::Line).is_ok());
+        assert!(with_lamp.admit(&frame(b"\x05\x04"), Remote::Line).is_err());
     }
 
     #[test]

@@ -5,7 +5,9 @@ use tracing::warn;
 use super::arrival::Arrival;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Outgoing, Remote};
-use crate::rights::{self, Decision, DecisionQueue, Table, Unaccepted, check_unrecorded, denial};
+use crate::rights::{
+    self, Admitted, Decision, DecisionQueue, Unaccepted, check_unrecorded, denial,
+};
 use crate::wire::Frame;
 
 /// A decision on a message of a plain link, or on the control of a client there.
@@ -42,30 +44,33 @@ impl Endpoint {
 
     /// Decides by the rights of the sender. A refused message is not acknowledged; a request for control
     /// is answered.
-    pub(super) fn refuse_without_right(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
+    pub(super) fn refuse_without_right(
+        &mut self,
+        arrival: Arrival<'_>,
+    ) -> Result<Admitted, Counter> {
         let Arrival {
             frame, now, path, ..
         } = arrival;
-        let checked = self.check_rights(frame, path.peer);
-        if checked.is_ok() && (!self.decisions.is_recording || is_session(path.peer)) {
-            return Ok(());
+        let admitted = self.admit(frame, path.peer);
+        if admitted.is_ok() && (!self.decisions.is_recording || is_session(path.peer)) {
+            return admitted.map_err(|_| Counter::NotGranted);
         }
-        let Some(decision) = Decision::of(frame, checked, &Table::default()) else {
-            return Ok(());
+        let checked = admitted.as_ref().map(|_| ()).map_err(|why| *why);
+        let Some(decision) = Decision::of(frame, checked, &self.config.access.table) else {
+            return admitted.map_err(|_| Counter::NotGranted);
         };
         let warning = Warning::NotGranted;
         if decision.is_refusal() && self.warnings.is_due(now, warning) {
             warn!(from = %path.peer, "refused {decision}");
         }
         self.record(decision, path.peer);
-        if checked.is_ok() {
-            return Ok(());
-        }
-        if let Some(denial) = denial(frame) {
+        if checked.is_err()
+            && let Some(denial) = denial(frame)
+        {
             // What cannot be encoded for the link is not answered.
             let _sent = self.send_along(now, path, &denial);
         }
-        Err(Counter::NotGranted)
+        admitted.map_err(|_| Counter::NotGranted)
     }
 
     /// Records what a component tells a client of a plain link about its control.
@@ -75,19 +80,20 @@ impl Endpoint {
         }
         let (client, payload) = (message.destination, message.payload.clone());
         let frame = Frame::new(message.source, client, payload);
-        if let Some(told) = Decision::told_by(&frame, &Table::default())
+        if let Some(told) = Decision::told_by(&frame, &self.config.access.table)
             && let Some((path, _)) = self.route(client)
         {
             self.record(told, path.peer);
         }
     }
 
-    fn check_rights(&self, frame: &Frame, from: Remote) -> Result<(), Unaccepted> {
-        self.config.access.check_rights(frame, from)?;
-        if !self.decisions.is_refusing || is_session(from) {
-            return Ok(());
+    fn admit(&self, frame: &Frame, from: Remote) -> Result<Admitted, Unaccepted> {
+        let access = &self.config.access;
+        let admitted = access.admit(frame, from)?;
+        if self.decisions.is_refusing && !is_session(from) {
+            check_unrecorded(frame, &access.table).map_err(Unaccepted::Rule)?;
         }
-        check_unrecorded(frame, &Table::default()).map_err(Unaccepted::Rule)
+        Ok(admitted)
     }
 
     fn record(&mut self, decision: Decision, client: Remote) {

@@ -155,7 +155,13 @@ impl Endpoint {
         let is_new = self.peers.get(frame.source).is_none();
         self.gate.admit(now, path, frame.source, is_new)?;
         // Neither a message for others nor one above the rate costs an answer or an entry.
-        self.refuse_without_right(arrival)?;
+        if let Some(copies) = self.refuse_without_right(arrival)?.copies(frame) {
+            // A copy may be for nobody here, and another one for somebody.
+            let accepted = copies
+                .iter()
+                .map(|frame| self.accept(Arrival { frame, ..arrival }, sink));
+            return accepted.reduce(Result::or).unwrap_or(Ok(()));
+        }
         // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
             if self.warnings.is_due(now, Warning::TableFull) {
@@ -188,7 +194,7 @@ impl Endpoint {
         }
         // Check before learning: a copy that arrived on another path must not move the peer.
         let novelty = match self.recall(arrival, seen) {
-            Novelty::Repeated { .. } if self.reassembly.awaits(frame) => Novelty::New,
+            Novelty::Repeated { .. } if self.reassembly.awaits(frame, path) => Novelty::New,
             novelty => novelty,
         };
         if novelty != Novelty::New {
@@ -302,7 +308,7 @@ impl Endpoint {
         };
         let is_single = frame.flags.data() == DataControl::Single;
         let large = if is_single {
-            self.reassembly.finish(source, frame.sequence)
+            self.reassembly.finish(frame, path)
         } else {
             let style = self.peers.large_style(source);
             let inserted = self.reassembly.insert(arrival, style, &mut self.counters)?;

@@ -143,7 +143,7 @@ impl Node {
         let links = Links::open(&config, links)?;
         let listener = match &config.local {
             Local::Off => None,
-            Local::At(address) => Some(Listener::open(address)?),
+            Local::At(address) => Some(Listener::open(address, config.local_group)?),
         };
         let follows = links.follows();
         let local_place = listener.as_ref().map(Listener::place);

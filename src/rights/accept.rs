@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Refusal, RuleError, Rules, Table};
+use super::{Admitted, Refusal, RuleError, Rules, Table};
 use crate::address::JausId;
 use crate::as_text::serde_as_text;
 use crate::wire::Frame;
@@ -30,6 +30,12 @@ pub enum GrantError {
     /// A word is no right.
     #[error(transparent)]
     Rule(#[from] RuleError),
+    /// The emergencies of others can be cleared over a secure link alone.
+    #[error(
+        "`clear-emergency=any` has no effect on plain links, where ids are not proven: write `clear-emergency` \
+         in the grant `{0}`, or use a secure link"
+    )]
+    ClearAny(String),
 }
 
 impl FromStr for Grant {
@@ -104,29 +110,58 @@ impl Acceptance {
         grant_of(&self.0, id).is_some()
     }
 
+    /// Whether no id may do more than [`Rules::watch`] allows, so that nothing is gained by the id of
+    /// another one.
+    #[must_use]
+    pub fn only_watches(&self) -> bool {
+        self.0.iter().all(|grant| grant.rules.only_watch())
+    }
+
     /// Checks a message; the table tells what it needs.
     ///
     /// # Errors
     /// Why it is not accepted.
     pub fn check(&self, frame: &Frame, table: &Table) -> Result<(), Unaccepted> {
-        check(&self.0, frame, table)
+        let grant = grant_of(&self.0, frame.source).ok_or(Unaccepted::Source)?;
+        grant.rules.check(frame, table).map_err(Unaccepted::Rule)
+    }
+
+    /// Checks a message as [`check`](Self::check), and says to which ids it may go.
+    ///
+    /// # Errors
+    /// Why it is not accepted.
+    pub fn admit(&self, frame: &Frame, table: &Table) -> Result<Admitted, Unaccepted> {
+        admit(&self.0, frame, table)
+    }
+
+    /// Checks the names in the rights of all grants: see [`Rules::verify`].
+    ///
+    /// # Errors
+    /// The first grant with a name that is wrong.
+    pub fn verify(&self, table: &Table) -> Result<(), RuleError> {
+        self.0.iter().try_for_each(|it| it.rules.verify(table))
     }
 
     /// The ids to subscribe to: none is part of another.
     #[must_use]
     pub fn patterns(&self) -> Vec<JausId> {
         let ids: Vec<_> = self.0.iter().map(|grant| grant.ids).collect();
-        let covers = |wide: JausId, narrow: JausId| wide.intersection(narrow) == Some(narrow);
-        let is_needed = |&(at, id): &(usize, JausId)| {
-            let others = ids.iter().enumerate().filter(|&(other, _)| other != at);
-            // Of two equal ones the first is needed.
-            !others
-                .into_iter()
-                .any(|(other, &wide)| covers(wide, id) && (wide != id || other < at))
-        };
-        let needed = ids.iter().copied().enumerate().filter(is_needed);
-        needed.map(|(_, id)| id).collect()
+        widest(&ids)
     }
+}
+
+/// Those of some ids with wildcards that are part of no other.
+pub(super) fn widest(ids: &[JausId]) -> Vec<JausId> {
+    let covers = |wide: JausId, narrow: JausId| wide.intersection(narrow) == Some(narrow);
+    let is_needed = |&(at, id): &(usize, JausId)| {
+        let others = ids.iter().enumerate().filter(|&(other, _)| other != at);
+        // Of two equal ones the first is needed.
+        !others
+            .into_iter()
+            .any(|(other, &wide)| covers(wide, id) && (wide != id || other < at))
+    };
+    let needed = ids.iter().copied().enumerate().filter(is_needed);
+    needed.map(|(_, id)| id).collect()
 }
 
 /// The first grant that an id matches.
@@ -134,10 +169,14 @@ fn grant_of(grants: &[Grant], id: JausId) -> Option<&Grant> {
     grants.iter().find(|grant| grant.ids.matches(id))
 }
 
-/// Checks a message by the first of these grants that its source matches.
-pub(crate) fn check(grants: &[Grant], frame: &Frame, table: &Table) -> Result<(), Unaccepted> {
+/// Checks a message by the first of these grants that its source matches, and says to which ids it may go.
+pub(crate) fn admit(
+    grants: &[Grant],
+    frame: &Frame,
+    table: &Table,
+) -> Result<Admitted, Unaccepted> {
     let grant = grant_of(grants, frame.source).ok_or(Unaccepted::Source)?;
-    grant.rules.check(frame, table).map_err(Unaccepted::Rule)
+    grant.rules.admit(frame, table).map_err(Unaccepted::Rule)
 }
 
 serde_as_text!(Grant);
@@ -208,6 +247,23 @@ mod tests {
         }
         let error = "60 drive".parse::<Grant>().unwrap_err().to_string();
         assert!(error.contains("control=AUTHORITY"), "{error}");
+    }
+
+    #[test]
+    fn a_grant_that_lets_an_id_do_anything_is_told_from_those_that_let_it_watch() {
+        assert!(Acceptance::default().only_watches());
+        assert!(acceptance(&["60 except=SetEmergency", "61 except=0006h"]).only_watches());
+        for more in [
+            "60 observe",
+            "60 except=SetEmergency command",
+            "60 except=SetEmergency control=0",
+            "60 except=SetEmergency clear-emergency",
+            "60 except=SetEmergency configure",
+            "60 except=SetEmergency also=D103h",
+        ] {
+            let both = acceptance(&["61 except=SetEmergency", more]);
+            assert!(!both.only_watches(), "{more}");
+        }
     }
 
     #[test]

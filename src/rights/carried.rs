@@ -1,6 +1,8 @@
 //! Finds the messages inside a message: the query in a request for an event, the elements of a list,
 //! the messages of a mission. `jsidl::permission` describes the notation of layouts.
 
+use crate::address::JausId;
+
 /// How deep messages may be inside each other.
 pub(super) const DEEPEST: usize = 8;
 
@@ -8,9 +10,17 @@ pub(super) const DEEPEST: usize = 8;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Carried<'m> {
     /// These messages; none if it is no message that carries others.
-    Messages(Vec<&'m [u8]>),
+    Messages(Vec<Inner<'m>>),
     /// It cannot be told: it is malformed, or a fragment, or of a kind that cannot be read.
     Unclear,
+}
+
+/// A message inside another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Inner<'m> {
+    pub(super) octets: &'m [u8],
+    /// The component to which the receiver sends it; `None` if the receiver itself obeys it.
+    pub(super) to: Option<JausId>,
 }
 
 /// The messages inside a message. If several layouts fit, those of all of them.
@@ -21,6 +31,7 @@ pub(super) fn find<'m>(layouts: &[Layout], message: &'m [u8]) -> Carried<'m> {
     for layout in layouts {
         let mut reader = Reader {
             rest: body,
+            to: None,
             found: Vec::new(),
         };
         if reader.steps(&layout.0).is_some() {
@@ -47,6 +58,8 @@ enum Step {
     Octets(usize),
     /// A count of this size, and a message of that length.
     Message(usize),
+    /// The component to which the messages behind it are sent.
+    Destination,
     /// A format, a count of this size, and a message in one of these formats.
     Formatted(usize, Vec<u8>),
     /// A count of this size, and so many elements.
@@ -88,6 +101,7 @@ impl Notation<'_> {
                 '.' => continue,
                 'b' => Step::Octets(self.number()?),
                 'm' => Step::Message(self.number()?),
+                'd' => Step::Destination,
                 'f' => Step::Formatted(self.number()?, self.formats()?),
                 '*' => Step::List(self.number()?, self.enclosed()?.pop()?.1),
                 '?' => Step::Group(self.number()?, self.enclosed()?),
@@ -144,19 +158,29 @@ impl Notation<'_> {
 /// Reads a message by its layout.
 struct Reader<'m> {
     rest: &'m [u8],
-    found: Vec<&'m [u8]>,
+    /// The destination that was read last, in what encloses this place.
+    to: Option<JausId>,
+    found: Vec<Inner<'m>>,
 }
 
 impl<'m> Reader<'m> {
     /// `None` if the message ends too early, or has what is unknown.
     fn steps(&mut self, steps: &[Step]) -> Option<()> {
-        steps.iter().try_for_each(|step| self.step(step))
+        // A destination holds in its element of a list, and not for the next one.
+        let outer = self.to;
+        steps.iter().try_for_each(|step| self.step(step))?;
+        self.to = outer;
+        Some(())
     }
 
     fn step(&mut self, step: &Step) -> Option<()> {
         match step {
             Step::Fixed(octets) => _ = self.take(*octets)?,
             Step::Octets(size) => _ = self.counted(*size)?,
+            Step::Destination => {
+                let octets = self.take(size_of::<u32>())?;
+                self.to = Some(JausId::from_wire(*octets.first_chunk()?));
+            }
             Step::Message(size) => {
                 let message = self.counted(*size)?;
                 self.find(message);
@@ -199,9 +223,12 @@ impl<'m> Reader<'m> {
     }
 
     /// Notes a message, unless there is none.
-    fn find(&mut self, message: &'m [u8]) {
-        if !message.is_empty() {
-            self.found.push(message);
+    fn find(&mut self, octets: &'m [u8]) {
+        if !octets.is_empty() {
+            self.found.push(Inner {
+                octets,
+                to: self.to,
+            });
         }
     }
 
@@ -238,7 +265,23 @@ mod tests {
     }
 
     fn some<'m>(messages: &[&'m [u8]]) -> Carried<'m> {
-        Carried::Messages(messages.to_vec())
+        let inner = |&octets| Inner { octets, to: None };
+        Carried::Messages(messages.iter().map(inner).collect())
+    }
+
+    #[test]
+    fn a_destination_is_that_of_the_messages_behind_it_in_its_element() {
+        let message = b"\0\0\x02\x21\x01\x65\0\x01A\xFF\xFF\x66\0\x01B\x01C";
+        let inner = |octets, to| Inner { octets, to };
+        let found = carried(&["[*1(dm1)m1]"], message);
+        let expected = [
+            inner(b"A", Some(JausId::new(101, 1, 33))),
+            inner(b"B", Some(JausId::new(102, 255, 255))),
+            inner(b"C", None),
+        ];
+        assert_eq!(found, Carried::Messages(expected.to_vec()));
+        // An id that is cut off is none.
+        assert_eq!(carried(&["[*1(dm1)m1]"], &message[..6]), Carried::Unclear);
     }
 
     #[test]

@@ -59,13 +59,13 @@ impl Decision {
     pub fn of(frame: &Frame, checked: Result<(), Unaccepted>, table: &Table) -> Option<Self> {
         match checked {
             Ok(()) if is_recorded(frame, table) => {
-                let matters = |it: Option<Permission>| it.is_some_and(Permission::is_recorded);
+                let matters = |message: &[u8]| table.needs(message).any(Permission::is_recorded);
                 let what = what(&frame.payload, table, matters);
                 Some(Self::new(frame, what, Verdict::Passed))
             }
             Ok(()) => None,
             Err(why) => {
-                let matters = |it: Option<Permission>| !it.is_some_and(Permission::is_free);
+                let matters = |message: &[u8]| !needs_nothing(message, table);
                 let what = what(&frame.payload, table, matters);
                 Some(Self::new(frame, what, Verdict::Refused(why)))
             }
@@ -79,11 +79,15 @@ impl Decision {
         if !begins(frame) {
             return None;
         }
-        let verdict = match table.permission(&frame.payload) {
-            Some(Permission::Answer { is_granted: true }) => Verdict::Granted,
-            Some(Permission::Answer { is_granted: false }) => Verdict::Denied,
-            _ if frame.code() == Some(RejectControl::CODE) => Verdict::Ended,
-            _ => return None,
+        let answer = table.needs(&frame.payload).find_map(|it| match it {
+            Permission::Answer { is_granted } => Some(is_granted),
+            _ => None,
+        });
+        let verdict = match answer {
+            Some(true) => Verdict::Granted,
+            Some(false) => Verdict::Denied,
+            None if frame.code() == Some(RejectControl::CODE) => Verdict::Ended,
+            None => return None,
         };
         Some(Self::new(frame, table.name_of(&frame.payload), verdict))
     }
@@ -123,11 +127,11 @@ impl fmt::Display for Decision {
 
 /// The names of the messages that matter: those that the message carries, and then its own; or its own
 /// alone.
-fn what(message: &[u8], table: &Table, matters: impl Fn(Option<Permission>) -> bool) -> String {
+fn what(message: &[u8], table: &Table, matters: impl Fn(&[u8]) -> bool) -> String {
     let own = table.name_of(message);
     let mut inside = Inside::default();
     inside.find(message, (table, carried::DEEPEST), &matters);
-    if inside.names.is_empty() && !matters(table.permission(message)) {
+    if inside.names.is_empty() && !matters(message) {
         // A rule excludes what everybody may otherwise do: it may be any of them.
         inside.find(message, (table, carried::DEEPEST), &|_| true);
     }
@@ -155,18 +159,19 @@ impl Inside {
         &mut self,
         message: &[u8],
         (table, depth): (&Table, usize),
-        matters: &impl Fn(Option<Permission>) -> bool,
+        matters: &impl Fn(&[u8]) -> bool,
     ) {
         let Carried::Messages(carried) = table.carried(message) else {
             return;
         };
         for message in carried.into_iter().filter(|_| depth > 0) {
-            let permission = table.permission(message);
+            let message = message.octets;
+            let clears_all = |it| it == Permission::ClearAnyEmergency;
             let kind = (
                 table::code_of(message),
-                permission == Some(Permission::ClearAnyEmergency),
+                table.needs(message).any(clears_all),
             );
-            if matters(permission) && !self.kinds.contains(&kind) {
+            if matters(message) && !self.kinds.contains(&kind) {
                 self.kinds.push(kind);
                 if self.names.len() < MOST_NAMES {
                     self.names.push(table.name_of(message));
@@ -177,6 +182,12 @@ impl Inside {
             self.find(message, (table, depth - 1), matters);
         }
     }
+}
+
+/// Whether everybody may send a message: a definition states it, and that it needs no right.
+fn needs_nothing(message: &[u8], table: &Table) -> bool {
+    let mut needs = table.needs(message).peekable();
+    needs.peek().is_some() && needs.all(Permission::needs_no_right)
 }
 
 /// Whether a frame has the beginning of a message, and so its code.

@@ -17,10 +17,36 @@
 //! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries |
 //! | `also=D103h` | send these codes, too, although no definition states what they need; `also=any`: all of them |
 //!
-//! `only` and `except` name services, messages or message codes. All rules also apply to the messages
-//! that a message carries: the query in a request for an event, the elements of a list, the messages of
-//! a mission. What a message carries must be in its first fragment, unless its sender may do everything.
-//! Control, emergencies and configuration have words of their own: `only` does not concern them.
+//! `only` and `except` name services, messages or message codes. A name that the definitions in use do not
+//! have never gives a right: [`Rules::verify`] reports it.
+//!
+//! # Messages inside messages
+//!
+//! All rules also apply to the messages that a message carries: the query in a request for an event, the
+//! elements of a list, the messages of a mission. `with` applies to the component that a mission names for
+//! each message. What a message carries must be in its first fragment, unless its sender may do everything.
+//! The reports inside Event and Report Events are not looked at: they answer a subscription, and no receiver
+//! obeys them.
+//!
+//! # `only`
+//!
+//! `only=PrimitiveDriver` means: it may drive by efforts, and do nothing else that a command does. So it does
+//! not let lists and missions be changed (Set Element, Spool Mission), whatever they carry, unless they are
+//! listed, too. Create Command Event passes, because it does nothing but what it carries, and what it carries
+//! must be listed, or need no right. Requests for control, clearing of emergencies and configuration have
+//! words of their own, and pass if they are sent plainly; inside other messages they must be listed as well.
+//!
+//! # Groups
+//!
+//! A message to a group of ids (with wildcards) that is wider than `with`: a command is refused, a query
+//! passes. What ends or stops (Set Emergency, Release Control) goes to those of the group that are in `with`,
+//! and to no others: a stop does not fail for lack of a right, and does not reach the vehicles of others. See
+//! [`Rules::admit`].
+//!
+//! # Codes with several meanings
+//!
+//! If definitions give one code to different messages, their sender needs the rights of all: F92Ah, Query
+//! Measurement of one service and a command of another, needs `command`. A node cannot tell which is meant.
 //!
 //! What no definition states needs `also`: nobody knows what it does.
 //!
@@ -33,16 +59,15 @@ mod decision;
 mod queue;
 mod selection;
 mod table;
+mod words;
 
-use std::fmt;
-use std::str::FromStr;
-
-pub(crate) use accept::check as check_by_grants;
+pub(crate) use accept::admit as admit_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
 pub use decision::{Decision, Verdict, check_unrecorded, denial};
 pub use queue::{Decided, DecisionQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
+pub use words::RuleError;
 
 use crate::address::JausId;
 use crate::codec::Message as _;
@@ -82,10 +107,10 @@ pub enum Refusal {
     #[error("its sender may not exchange messages with this id")]
     Elsewhere,
     /// A command without [`Rules::command`].
-    #[error("its sender may only observe: add `command` or `control=AUTHORITY` to its line")]
+    #[error("its sender may only observe: give it `command` or `control=AUTHORITY`")]
     Command,
     /// Control is requested without [`Rules::control`].
-    #[error("its sender may not take control: add `control=AUTHORITY` to its line")]
+    #[error("its sender may not take control: give it `control=AUTHORITY`")]
     Control,
     /// Control is requested with too great an authority.
     #[error("authority {asked}, but its sender may take control with at most {most}")]
@@ -96,18 +121,16 @@ pub enum Refusal {
         most: u8,
     },
     /// An emergency is cleared without [`Rules::clear_emergency`].
-    #[error("its sender may not clear emergencies: add `clear-emergency` to its line")]
+    #[error("its sender may not clear emergencies: give it `clear-emergency`")]
     ClearEmergency,
     /// The emergencies of all clients are cleared without [`Rules::clear_any_emergency`].
-    #[error(
-        "its sender may not clear the emergencies of others: add `clear-emergency=any` to its line"
-    )]
+    #[error("its sender may not clear the emergencies of others: give it `clear-emergency=any`")]
     ClearAnyEmergency,
     /// A component is configured without [`Rules::configure`].
-    #[error("its sender may not shut down, reset or set the time: add `configure` to its line")]
+    #[error("its sender may not shut down, reset or set the time: give it `configure`")]
     Configure,
     /// A message that commands is for several ids, not all of which are among [`Rules::with`].
-    #[error("`with` in the line of its sender does not cover all of these ids")]
+    #[error("`with` in the rights of its sender does not cover all of these ids")]
     TooWide,
     /// What it carries cannot be told.
     #[error(
@@ -116,17 +139,17 @@ pub enum Refusal {
     )]
     Hidden,
     /// No definition states what it needs.
-    #[error(
-        "no definition states what this message needs: add `also=` with its code to the line of its \
-         sender"
-    )]
+    #[error("no definition states what this message needs: give its sender `also=` with its code")]
     Unknown,
     /// The command is not among [`Rules::only`], or the message is among [`Rules::except`].
-    #[error("`only` or `except` in the line of its sender excludes this message")]
+    #[error("`only` or `except` in the rights of its sender excludes this message")]
     Excluded,
     /// It would change something while the audit log cannot be written, and that is to be recorded.
     #[error("the audit log cannot be written: until then only queries and stops are accepted")]
     Unrecorded,
+    /// [`Rules::except`] has a name that no definition in use has, so nobody knows what it excludes.
+    #[error("`except` in the rights of its sender has a name that no definition in use has")]
+    UnknownName,
     /// The message is too short to have a message code.
     #[error("it has no message code")]
     NoCode,
@@ -156,66 +179,123 @@ impl Rules {
         }
     }
 
+    /// Whether they allow no more than [`watch`](Self::watch).
+    #[must_use]
+    pub fn only_watch(&self) -> bool {
+        let everywhere = Self {
+            with: Vec::new(),
+            only: Selection::default(),
+            except: Selection::default(),
+            ..self.clone()
+        };
+        everywhere == Self::default() && self.except.contains(SetEmergency::CODE)
+    }
+
     /// Checks a frame from the sender; the table tells what messages need. Later fragments pass: without
     /// the first one they are nothing.
     ///
     /// # Errors
-    /// The rule that forbids it.
+    /// The rule that forbids it. [`Refusal::TooWide`] also if [`admit`](Self::admit) would let it pass to
+    /// a part of the group that it is for.
     pub fn check(&self, frame: &Frame, table: &Table) -> Result<(), Refusal> {
-        if !self.may_reach(frame.destination) {
+        match self.admit(frame, table)? {
+            Admitted::Whole => Ok(()),
+            Admitted::Narrowed(_) => Err(Refusal::TooWide),
+        }
+    }
+
+    /// Checks a frame as [`check`](Self::check), and says to which ids it may go: what ends or stops
+    /// something goes to those of a group that are in [`with`](Self::with).
+    ///
+    /// # Errors
+    /// The rule that forbids it.
+    pub fn admit(&self, frame: &Frame, table: &Table) -> Result<Admitted, Refusal> {
+        let to = frame.destination;
+        if !self.may_reach(to) {
             return Err(Refusal::Elsewhere);
         }
         if frame.is_acknowledgement() || (is_later(frame) && !repeats_code(frame)) {
-            return Ok(());
+            return Ok(Admitted::Whole);
         }
-        self.check_message(&frame.payload, frame.destination, (table, carried::DEEPEST))
-    }
-
-    /// Checks a message, and those that it carries so many levels deep.
-    fn check_message(
-        &self,
-        message: &[u8],
-        to: JausId,
-        (table, depth): (&Table, usize),
-    ) -> Result<(), Refusal> {
-        let code = table::code_of(message).ok_or(Refusal::NoCode)?;
-        let permission = table.permission(message);
-        match permission {
-            Some(permission) => self.check_permission(permission)?,
-            None if self.also.contains(code) => {}
-            None => return Err(Refusal::Unknown),
+        let depth = 0;
+        self.check_message(&frame.payload, Within { table, to, depth })?;
+        let ends_or_stops = || {
+            let mut needs = table.needs(&frame.payload);
+            needs.any(Permission::ends_or_stops)
+        };
+        if self.covers(to) || !ends_or_stops() {
+            return Ok(Admitted::Whole);
         }
-        let carried = table.carried(message);
-        let is_empty = matches!(&carried, Carried::Messages(carried) if carried.is_empty());
-        // Of a message that carries commands, these count.
-        let is_selected = !matches!(permission, Some(Permission::Command) | None)
-            || !is_empty
-            || self.only.is_empty()
-            || self.only.contains(code);
-        if !is_selected || self.except.contains(code) {
-            return Err(Refusal::Excluded);
-        }
-        let is_free = permission.is_some_and(Permission::is_free);
-        if !is_free && !self.covers(to) {
+        if frame.flags.data() != DataControl::Single {
+            // Its other fragments could not be narrowed with it. None of these messages is that long.
             return Err(Refusal::TooWide);
         }
-        match carried {
-            Carried::Messages(carried) if depth > 0 => carried
-                .into_iter()
-                .try_for_each(|message| self.check_message(message, to, (table, depth - 1))),
-            _ if is_empty || self.are_all() => Ok(()),
+        Ok(Admitted::Narrowed(self.within(to)))
+    }
+
+    /// The ids of a group among [`with`](Self::with): none is part of another.
+    fn within(&self, group: JausId) -> Vec<JausId> {
+        let parts = self.with.iter().filter_map(|with| with.intersection(group));
+        accept::widest(&parts.collect::<Vec<_>>())
+    }
+
+    /// Checks a message, and those that it carries.
+    fn check_message(&self, message: &[u8], within: Within<'_>) -> Result<(), Refusal> {
+        let Within { table, to, depth } = within;
+        let code = table::code_of(message).ok_or(Refusal::NoCode)?;
+        if !self.may_reach(to) {
+            return Err(Refusal::Elsewhere);
+        }
+        if !table.knows(code) && !self.also.contains(code, table) {
+            return Err(Refusal::Unknown);
+        }
+        table
+            .needs(message)
+            .try_for_each(|it| self.check_permission(it))?;
+        self.check_selection(code, message, within)?;
+        if !self.covers(to) && !may_be_wide(message, within) {
+            return Err(Refusal::TooWide);
+        }
+        match table.carried(message) {
+            Carried::Messages(carried) if carried.is_empty() => Ok(()),
+            Carried::Messages(carried) if depth < carried::DEEPEST => {
+                carried.into_iter().try_for_each(|inner| {
+                    let (to, depth) = (inner.to.unwrap_or(to), depth + 1);
+                    self.check_message(inner.octets, Within { table, to, depth })
+                })
+            }
+            _ if self.allows_everything() => Ok(()),
             _ => Err(Refusal::Hidden),
         }
     }
 
-    /// Whether there is no message that they forbid. Where messages may go is checked apart.
-    fn are_all(&self) -> bool {
-        let with = self.with.clone();
-        *self
-            == Self {
-                with,
-                ..Self::everything()
-            }
+    /// Checks a message against `only` and `except`.
+    fn check_selection(
+        &self,
+        code: u16,
+        message: &[u8],
+        Within { table, depth, .. }: Within<'_>,
+    ) -> Result<(), Refusal> {
+        if self.except.has_unknown(table) {
+            return Err(Refusal::UnknownName);
+        }
+        let concerns = |permission: Permission| match permission {
+            Permission::Command => true,
+            Permission::Carry => false,
+            // What somebody else sends on request is not what its word allows.
+            other => depth > 0 && !other.needs_no_right(),
+        };
+        let is_concerned = !table.knows(code) || table.needs(message).any(concerns);
+        let is_left_out = is_concerned && !self.only.is_empty() && !self.only.contains(code, table);
+        if is_left_out || self.except.contains(code, table) {
+            return Err(Refusal::Excluded);
+        }
+        Ok(())
+    }
+
+    /// Whether there is no message that they forbid, to whatever component.
+    fn allows_everything(&self) -> bool {
+        *self == Self::everything()
     }
 
     fn check_permission(&self, permission: Permission) -> Result<(), Refusal> {
@@ -225,7 +305,9 @@ impl Rules {
             | Permission::Release
             | Permission::Emergency => return Ok(()),
             Permission::Control { authority } => return self.check_authority(authority),
-            Permission::Command => (self.command || self.control.is_some(), Refusal::Command),
+            Permission::Command | Permission::Carry => {
+                (self.command || self.control.is_some(), Refusal::Command)
+            }
             Permission::ClearEmergency => (self.clear_emergency, Refusal::ClearEmergency),
             Permission::ClearAnyEmergency => (self.clear_any_emergency, Refusal::ClearAnyEmergency),
             Permission::Configure => (self.configure, Refusal::Configure),
@@ -259,6 +341,49 @@ impl Rules {
     }
 }
 
+/// The place of a message that is checked.
+#[derive(Clone, Copy)]
+struct Within<'t> {
+    table: &'t Table,
+    /// The component that it is for.
+    to: JausId,
+    /// How many messages it is inside of.
+    depth: usize,
+}
+
+/// Whether a message may be for ids some of which its sender may not reach. What is free may; but what ends
+/// or stops something must be narrowed, which nobody can do inside of another message.
+fn may_be_wide(message: &[u8], Within { table, depth, .. }: Within<'_>) -> bool {
+    let may_be = |it: Permission| it.needs_no_right() && (depth == 0 || !it.ends_or_stops());
+    let mut needs = table.needs(message).peekable();
+    needs.peek().is_some() && needs.all(may_be)
+}
+
+/// To which ids an admitted frame may go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum Admitted {
+    /// To all that it is for.
+    Whole,
+    /// To these of the group that it is for: a copy to each.
+    Narrowed(Vec<JausId>),
+}
+
+impl Admitted {
+    /// Copies of a frame for the ids to which it may go; `None` if it may go as it is.
+    #[must_use]
+    pub fn copies(self, frame: &Frame) -> Option<Vec<Frame>> {
+        let Self::Narrowed(ids) = self else {
+            return None;
+        };
+        let copy = |destination| Frame {
+            destination,
+            ..frame.clone()
+        };
+        Some(ids.into_iter().map(copy).collect())
+    }
+}
+
 /// Whether a frame is a later fragment.
 fn is_later(frame: &Frame) -> bool {
     matches!(frame.flags.data(), DataControl::Middle | DataControl::Last)
@@ -277,123 +402,9 @@ pub fn is_recorded(frame: &Frame, table: &Table) -> bool {
     !is_later(frame) && !frame.is_acknowledgement() && table.is_recorded(&frame.payload)
 }
 
-/// Why a word is no rule.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RuleError {
-    /// The word is unknown.
-    #[error(
-        "`{0}` is not a rule: write observe, command, control=AUTHORITY, clear-emergency, \
-         clear-emergency=any, configure, with=IDS, only=NAMES, except=NAMES or also=CODES"
-    )]
-    Word(String),
-    /// The authority is malformed.
-    #[error("`{0}` is not an authority: write a number from 0 to 255, such as control=127")]
-    Authority(String),
-    /// An id is malformed.
-    #[error("`{0}` is not an id such as 101.1.33, or 101.255.255 for all of 101")]
-    Id(String),
-    /// A service or message is unknown.
-    #[error(transparent)]
-    Name(#[from] UnknownName),
-    /// `only` or `with` has no entries, which would mean everything.
-    #[error("`{0}=` has no entries: leave it out, or list what it is about")]
-    Empty(String),
-}
-
-impl FromStr for Rules {
-    type Err = RuleError;
-
-    /// Reads words, separated by white space.
-    fn from_str(text: &str) -> Result<Self, RuleError> {
-        Self::parse(text.split_whitespace())
-    }
-}
-
-impl Rules {
-    /// Reads these words. Names are those of the catalogue; other messages have codes alone.
-    ///
-    /// # Errors
-    /// The first word that is no rule.
-    pub fn parse<'t>(words: impl IntoIterator<Item = &'t str>) -> Result<Self, RuleError> {
-        let mut rules = Self::default();
-        for word in words {
-            let (name, value) = word.split_once('=').unwrap_or((word, ""));
-            match (name, word.contains('=')) {
-                ("observe", false) => {}
-                ("command", false) => rules.command = true,
-                ("clear-emergency", false) => rules.clear_emergency = true,
-                ("clear-emergency", true) if value == "any" => {
-                    (rules.clear_emergency, rules.clear_any_emergency) = (true, true);
-                }
-                ("configure", false) => rules.configure = true,
-                ("with" | "only" | "except" | "also", true) if value.is_empty() => {
-                    return Err(RuleError::Empty(name.to_owned()));
-                }
-                ("control", true) => rules.control = Some(authority(value)?),
-                ("with", true) => rules.with = ids(value)?,
-                ("only", true) => rules.only = value.parse()?,
-                ("except", true) => rules.except = value.parse()?,
-                ("also", true) if value == "any" => rules.also = Selection::any(),
-                ("also", true) => rules.also = value.parse()?,
-                _ => return Err(RuleError::Word(shortened(word))),
-            }
-        }
-        Ok(rules)
-    }
-}
-
-fn authority(text: &str) -> Result<u8, RuleError> {
-    let unknown = |_| RuleError::Authority(shortened(text));
-    text.parse().map_err(unknown)
-}
-
-fn ids(text: &str) -> Result<Vec<JausId>, RuleError> {
-    let id = |text: &str| text.parse().map_err(|_| RuleError::Id(shortened(text)));
-    text.split(',').map(id).collect()
-}
-
 /// As much of a text as an error shows.
 fn shortened(text: &str) -> String {
     text.chars().take(60).collect()
-}
-
-impl fmt::Display for Rules {
-    /// The words of a trust file; nothing for the default.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut words = Vec::new();
-        let flags = [
-            (self.command, "command"),
-            (
-                self.clear_emergency && !self.clear_any_emergency,
-                "clear-emergency",
-            ),
-            (self.clear_any_emergency, "clear-emergency=any"),
-            (self.configure, "configure"),
-        ];
-        words.extend(
-            flags
-                .iter()
-                .filter(|(is_set, _)| *is_set)
-                .map(|(_, word)| (*word).to_owned()),
-        );
-        words.extend(self.control.map(|most| format!("control={most}")));
-        if !self.with.is_empty() {
-            let ids: Vec<_> = self.with.iter().map(JausId::to_string).collect();
-            words.push(format!("with={}", ids.join(",")));
-        }
-        let selections = [
-            ("only", &self.only),
-            ("except", &self.except),
-            ("also", &self.also),
-        ];
-        for (name, selection) in selections {
-            if !selection.is_empty() {
-                words.push(format!("{name}={selection}"));
-            }
-        }
-        f.write_str(&words.join(" "))
-    }
 }
 
 #[cfg(test)]

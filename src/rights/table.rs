@@ -1,6 +1,6 @@
 //! What the sender of each message needs, and where messages carry others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::{self, Write as _};
 use std::num::ParseIntError;
 use std::sync::{Arc, LazyLock};
@@ -12,7 +12,7 @@ static CATALOGUE: LazyLock<Table> = LazyLock::new(|| {
     let mut known = Known::default();
     for line in include_str!(concat!(env!("OUT_DIR"), "/permissions.txt")).lines() {
         // What cannot be read grants nothing; a test reads all of it.
-        let _read = known.read(line);
+        let _read = known.read(line, Origin::Catalogue);
     }
     Table(Arc::new(known))
 });
@@ -38,6 +38,8 @@ pub enum Permission {
     Emergency,
     /// To command.
     Command,
+    /// To command by what the message carries: it does nothing else.
+    Carry,
     /// To clear the sender's own emergency.
     ClearEmergency,
     /// To clear the emergencies of all clients.
@@ -55,7 +57,7 @@ impl Permission {
     /// Whether everybody has it who may send anything: it changes nothing, or ends what is the
     /// sender's own, or stops.
     #[must_use]
-    pub const fn is_free(self) -> bool {
+    pub const fn needs_no_right(self) -> bool {
         matches!(
             self,
             Self::Observe | Self::Answer { .. } | Self::Release | Self::Emergency
@@ -64,7 +66,16 @@ impl Permission {
 
     /// Whether an audit log holds each message that needs it.
     pub(super) const fn is_recorded(self) -> bool {
-        !matches!(self, Self::Observe | Self::Answer { .. } | Self::Command)
+        !matches!(
+            self,
+            Self::Observe | Self::Answer { .. } | Self::Command | Self::Carry
+        )
+    }
+
+    /// Whether it ends or stops something: then a message to a group must reach those of the group that
+    /// its sender may reach, and no others.
+    pub(super) const fn ends_or_stops(self) -> bool {
+        matches!(self, Self::Release | Self::Emergency)
     }
 
     fn of(word: &str) -> Option<Self> {
@@ -74,26 +85,12 @@ impl Permission {
             "release" => Self::Release,
             "emergency" => Self::Emergency,
             "command" => Self::Command,
+            "carry" => Self::Carry,
             "clear-emergency" => Self::ClearEmergency,
             "configure" => Self::Configure,
             "control" => Self::Control { authority: 0 },
             _ => return None,
         })
-    }
-
-    /// The greater of two comes later.
-    const fn rank(self) -> u8 {
-        match self {
-            Self::Observe => 0,
-            Self::Answer { .. } => 1,
-            Self::Release => 2,
-            Self::Emergency => 3,
-            Self::Command => 4,
-            Self::ClearEmergency => 5,
-            Self::ClearAnyEmergency => 6,
-            Self::Configure => 7,
-            Self::Control { .. } => 8,
-        }
     }
 }
 
@@ -105,7 +102,7 @@ impl fmt::Display for Permission {
             Self::Answer { .. } => "answer",
             Self::Release => "release",
             Self::Emergency => "emergency",
-            Self::Command => "command",
+            Self::Command | Self::Carry => "command",
             Self::ClearEmergency => "clear-emergency",
             Self::ClearAnyEmergency => "clear-emergency=any",
             Self::Configure => "configure",
@@ -129,16 +126,60 @@ struct Known {
     messages: BTreeMap<u16, Row>,
     /// The codes that each service receives.
     services: BTreeMap<String, Vec<u16>>,
+    /// The codes behind the names of definitions that are not of the catalogue.
+    further: BTreeMap<String, BTreeSet<u16>>,
+}
+
+/// Where a line of a table comes from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Origin {
+    Catalogue,
+    Further,
 }
 
 /// What is known of a message code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Row {
-    needs: Permission,
-    /// The place of the authority in the message, or of what says whether control is granted.
-    place: Option<usize>,
+    /// The sender must have all of these rights, one of each kind of message with this code.
+    needs: Vec<Need>,
     names: Vec<String>,
     carries: Vec<Layout>,
+}
+
+/// A right that a message needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Need {
+    right: Permission,
+    /// The place of the authority in the message, or of what says whether control is granted.
+    place: Option<usize>,
+}
+
+impl Need {
+    /// Reads `command`, or `control@2`.
+    fn read(text: &str) -> Option<Self> {
+        let (word, place) = match text.split_once('@') {
+            Some((word, place)) => (word, Some(place.parse().ok()?)),
+            None => (text, None),
+        };
+        let right = Permission::of(word)?;
+        Some(Self { right, place })
+    }
+
+    /// What it is for this message.
+    fn in_message(self, message: &[u8]) -> Permission {
+        let field = self.place.map(|place| message.get(place).copied());
+        match self.right {
+            Permission::Control { .. } => Permission::Control {
+                // What is malformed is refused as if it asked for all.
+                authority: field.map_or(0, |it| it.unwrap_or(u8::MAX)),
+            },
+            Permission::Answer { .. } => Permission::Answer {
+                is_granted: field.flatten() == Some(0),
+            },
+            Permission::ClearEmergency if may_clear_all(message) => Permission::ClearAnyEmergency,
+            right => right,
+        }
+    }
 }
 
 /// A line of a table that cannot be read.
@@ -151,7 +192,7 @@ pub struct TableError(String);
 
 impl Table {
     /// This table with the permissions of further definitions, as `jsidl::permission::Permissions`
-    /// writes them. Of a code that is known already, the greater right is needed.
+    /// writes them. For a code that is known already, the rights of both are needed.
     ///
     /// # Errors
     /// The first line that cannot be read.
@@ -159,27 +200,40 @@ impl Table {
         let mut known = Known::clone(&self.0);
         for line in lines.lines() {
             let shortened = || TableError(super::shortened(line));
-            known.read(line).ok_or_else(shortened)?;
+            known.read(line, Origin::Further).ok_or_else(shortened)?;
         }
         Ok(Self(Arc::new(known)))
     }
 
-    /// The right that a message needs, which begins with its code; `None` if no definition states it.
+    /// The rights that a message needs, which begins with its code: all of them, because two
+    /// definitions may give one code to different messages, and a node cannot tell which is meant. None
+    /// if no definition states what it needs.
+    pub fn needs<'m>(&'m self, message: &'m [u8]) -> impl Iterator<Item = Permission> + 'm {
+        let row = self.row(message).into_iter();
+        row.flat_map(|row| row.needs.iter().map(|need| need.in_message(message)))
+    }
+
+    /// The rights that a message needs, for people: words of rules, `also` if no definition states any.
     #[must_use]
-    pub fn permission(&self, message: &[u8]) -> Option<Permission> {
-        let row = self.row(message)?;
-        let field = row.place.map(|place| message.get(place).copied());
-        Some(match row.needs {
-            Permission::Control { .. } => Permission::Control {
-                // What is malformed is refused as if it asked for all.
-                authority: field.map_or(0, |it| it.unwrap_or(u8::MAX)),
-            },
-            Permission::Answer { .. } => Permission::Answer {
-                is_granted: field.flatten() == Some(0),
-            },
-            Permission::ClearEmergency if may_clear_all(message) => Permission::ClearAnyEmergency,
-            needs => needs,
-        })
+    pub fn words(&self, message: &[u8]) -> String {
+        let mut words = Vec::new();
+        for need in self.needs(message).filter(|it| !it.needs_no_right()) {
+            let word = need.to_string();
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+        let free = || self.needs(message).next().map(|it| it.to_string());
+        match words.is_empty() {
+            true => free().unwrap_or_else(|| "also".to_owned()),
+            false => words.join(" "),
+        }
+    }
+
+    /// Whether a definition states what messages with this code need.
+    #[must_use]
+    pub fn knows(&self, code: u16) -> bool {
+        self.0.messages.contains_key(&code)
     }
 
     /// The messages inside a message.
@@ -196,16 +250,13 @@ impl Table {
     }
 
     fn is_recorded_within(&self, message: &[u8], depth: usize) -> bool {
-        if self
-            .permission(message)
-            .is_some_and(Permission::is_recorded)
-        {
+        if self.needs(message).any(Permission::is_recorded) {
             return true;
         }
         match self.carried(message) {
             Carried::Messages(carried) if depth > 0 => carried
                 .into_iter()
-                .any(|message| self.is_recorded_within(message, depth - 1)),
+                .any(|inner| self.is_recorded_within(inner.octets, depth - 1)),
             _ => false,
         }
     }
@@ -220,7 +271,10 @@ impl Table {
         if name.is_empty() {
             name = format!("{code:04X}h");
         }
-        if self.permission(message) == Some(Permission::ClearAnyEmergency) {
+        if self
+            .needs(message)
+            .any(|it| it == Permission::ClearAnyEmergency)
+        {
             // Writing into a text never fails.
             let _written = write!(name, " of all clients");
         }
@@ -242,13 +296,19 @@ impl Table {
     /// service's name is its URN, or what follows the last colon of it.
     #[must_use]
     pub fn codes_of(&self, name: &str) -> Vec<u16> {
-        let names_service = |urn: &str| urn == name || urn.rsplit(':').next() == Some(name);
+        let names_service = |urn: &str| urn == name || short(urn) == name;
         let services = self.0.services.iter();
         let services = services.filter(|(urn, _)| names_service(urn));
         let inputs = services.flat_map(|(_, inputs)| inputs.iter().copied());
         let messages = self.0.messages.iter();
         let messages = messages.filter(|(_, row)| row.names.iter().any(|it| it == name));
         inputs.chain(messages.map(|(code, _)| *code)).collect()
+    }
+
+    /// The codes for which this name stands in definitions that are not of the catalogue.
+    pub(super) fn further(&self, name: &str) -> impl Iterator<Item = u16> + '_ {
+        let codes = self.0.further.get(name).into_iter();
+        codes.flat_map(|codes| codes.iter().copied())
     }
 
     fn row(&self, message: &[u8]) -> Option<&Row> {
@@ -258,30 +318,40 @@ impl Table {
 
 impl Known {
     /// Reads a line; `None` if it is malformed.
-    fn read(&mut self, line: &str) -> Option<()> {
+    fn read(&mut self, line: &str, origin: Origin) -> Option<()> {
         let mut words = line.split_whitespace();
         let first = words.next()?;
         if first == "service" {
-            let urn = words.next()?.to_owned();
+            let urn = words.next()?;
             let codes: Vec<_> = words.map(code).collect::<Result<_, _>>().ok()?;
-            self.services.entry(urn).or_default().extend(codes);
+            if origin == Origin::Further {
+                self.name(urn, &codes);
+                self.name(short(urn), &codes);
+            }
+            let known = self.services.entry(urn.to_owned()).or_default();
+            known.extend(codes);
             return Some(());
         }
         let code = code(first).ok()?;
-        let needs = words.next()?;
-        let (needs, place) = match needs.split_once('@') {
-            Some((needs, place)) => (needs, Some(place.parse().ok()?)),
-            None => (needs, None),
-        };
-        let names = words.next()?.split(',').map(str::to_owned).collect();
+        let needs = words.next()?.split(',').map(Need::read);
+        let needs = needs.collect::<Option<_>>()?;
+        let names: Vec<_> = words.next()?.split(',').map(str::to_owned).collect();
+        let carries = words.map(Layout::parse).collect::<Option<_>>()?;
+        if origin == Origin::Further {
+            names.iter().for_each(|name| self.name(name, &[code]));
+        }
         let row = Row {
-            needs: Permission::of(needs)?,
-            place,
+            needs,
             names,
-            carries: words.map(Layout::parse).collect::<Option<_>>()?,
+            carries,
         };
         self.add(code, row);
         Some(())
+    }
+
+    fn name(&mut self, name: &str, codes: &[u16]) {
+        let known = self.further.entry(name.to_owned()).or_default();
+        known.extend(codes);
     }
 
     fn add(&mut self, code: u16, row: Row) {
@@ -289,19 +359,24 @@ impl Known {
             self.messages.insert(code, row);
             return;
         };
-        if row.needs.rank() > known.needs.rank() {
-            (known.needs, known.place) = (row.needs, row.place);
-        }
-        let names = row.names.into_iter();
-        known.names.extend(
-            names
-                .filter(|it| !known.names.contains(it))
-                .collect::<Vec<_>>(),
-        );
-        let carries = row.carries.into_iter();
-        let new = carries.filter(|it| !known.carries.contains(it));
-        known.carries.extend(new.collect::<Vec<_>>());
+        add_new(&mut known.needs, row.needs);
+        add_new(&mut known.names, row.names);
+        add_new(&mut known.carries, row.carries);
     }
+}
+
+/// Adds the items that a list does not have.
+fn add_new<T: PartialEq>(list: &mut Vec<T>, items: Vec<T>) {
+    for item in items {
+        if !list.contains(&item) {
+            list.push(item);
+        }
+    }
+}
+
+/// A service's name for people: what follows the last colon of its URN.
+fn short(urn: &str) -> &str {
+    urn.rsplit(':').next().unwrap_or(urn)
 }
 
 fn code(digits: &str) -> Result<u16, ParseIntError> {

@@ -174,9 +174,7 @@ fn tell_place(id: JausId, node: Option<&Node>) {
     for link in node.links() {
         tracing::info!("{id} on {}, UDP {}", link.interface.name, link.local);
     }
-    if network::is_exposed(node) {
-        tracing::info!("{}", network::EXPOSED);
-    }
+    network::tell_exposure(node);
 }
 
 /// Parses flags and settings file; help, version and mistakes end the process here.

@@ -21,6 +21,7 @@ pub mod logging;
 pub mod metrics;
 pub mod network;
 pub mod output;
+pub mod permissions;
 pub mod reference;
 pub mod runtime;
 #[cfg(feature = "secure")]

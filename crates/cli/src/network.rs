@@ -23,6 +23,7 @@ use super::failure::Failure;
 use super::identity::OwnId;
 pub use super::identity::{Identity, SubsystemKind};
 use super::log_level::LogLevel;
+use super::permissions::table_with;
 #[cfg(feature = "secure")]
 use super::secure::{Secure, SecureFlags};
 use super::settings;
@@ -89,6 +90,11 @@ pub struct Network {
     #[arg(long, value_name = "IDS RULES")]
     grant: Vec<Grant>,
 
+    /// Decide on messages of one's own, too, by what the JSIDL file or directory states of them: for
+    /// --grant, as --secure-jsidl for secure links (repeatable)
+    #[arg(long, value_name = "PATH")]
+    grant_jsidl: Vec<PathBuf>,
+
     /// Attach to this host's node (`jaus node --local`) instead of running our own; ADDRESS is its
     /// local link's [default: the usual place]
     #[arg(
@@ -99,7 +105,7 @@ pub struct Network {
         default_missing_value = "default",
         conflicts_with_all = [
             "interface", "loopback", "port", "group", "ttl", "peer", "allow", "deny", "bind",
-            "grant",
+            "grant", "grant_jsidl",
         ],
     )]
     attach: Option<Address>,
@@ -319,17 +325,17 @@ impl Network {
         self.audit.log(self.file())
     }
 
-    /// Refuses a secure link, for a command that examines plain links only.
+    /// Refuses a secure link that listens, for a command that runs several nodes or none.
     ///
     /// # Errors
-    /// If flags or the settings file name a secure link.
-    pub fn require_plain(&self) -> Result<(), Failure> {
+    /// If flags or the settings file name such a link.
+    pub fn require_dialling(&self, command: &str) -> Result<(), Failure> {
         #[cfg(feature = "secure")]
-        if self.secure()?.is_some() {
-            return Err(Failure::new(
-                "this command uses plain links only: omit --secure-listen, --secure-peer and \
-                 --secure-announce, or choose a settings file without [secure]",
-            ));
+        if self.secure()?.is_some_and(|it| !it.only_dials()) {
+            return Err(Failure::new(format!(
+                "`{command}` connects to the peer: name it by --secure-peer, and omit --secure-listen, \
+                 --secure-announce, or choose a settings file without them"
+            )));
         }
         Ok(())
     }
@@ -396,6 +402,8 @@ impl Network {
         }
         node.access.bind.extend(&self.bind);
         node.access.grants.extend_from_slice(&self.grant);
+        node.access.jsidl.extend_from_slice(&self.grant_jsidl);
+        node.access.table = table_with(&node.access.jsidl)?;
         #[cfg(unix)]
         if self.junior.is_some() {
             node.junior.clone_from(&self.junior);
@@ -410,15 +418,49 @@ pub const REMEDY: &str = "List components with `jaus discover`, choose the netwo
     --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
     what is wrong";
 
-/// What a node says once at its start if it has plain links to other hosts.
-pub const EXPOSED: &str = "plain JUDP: every host on these networks can read and send messages in \
-    any id; secure links prevent that (docs/security.md)";
+/// Says at the start of a node, once, if it has plain links to other hosts, and who may command by them.
+pub fn tell_exposure(node: &Node) {
+    let Some(on) = exposure(node) else {
+        return;
+    };
+    match node.config().access.grants.is_empty() {
+        true => tracing::warn!(
+            "plain JUDP on {on}: ANY HOST ON THESE NETWORKS MAY COMMAND this node, in any id. Name the \
+             network by --interface, say who may command by --grant or [access] grants \
+             (docs/hardening.md), or use secure links (docs/secure-links.md)"
+        ),
+        false => tracing::info!(
+            "plain JUDP on {on}: every host on these networks can read messages, and send them in any id \
+             that is not bound to an address; secure links prevent that (docs/security.md)"
+        ),
+    }
+}
 
-/// Whether a node has plain links to other hosts.
-#[must_use]
-pub fn is_exposed(node: &Node) -> bool {
-    let links = node.links();
-    links.iter().any(|link| !link.local.ip().is_loopback())
+/// The plain links of a node to other hosts, or `None` if it has none.
+fn exposure(node: &Node) -> Option<String> {
+    let (config, links) = (node.config(), node.links());
+    let open = links.iter().filter(|it| !it.local.ip().is_loopback());
+    let mut on: Vec<_> = open.map(|it| it.interface.name.clone()).collect();
+    on.dedup();
+    // The network may come later than a service.
+    let may_come = match &config.interfaces {
+        Interfaces::Loopback => false,
+        Interfaces::Only(names) => links.is_empty() && !names.is_empty(),
+        Interfaces::All => on.is_empty(),
+    };
+    #[cfg(unix)]
+    let junior = config.junior.is_some();
+    #[cfg(not(unix))]
+    let junior = false;
+    match (junior, may_come) {
+        (true, _) => on.push("the interfaces of Junior".to_owned()),
+        (false, true) => on.push("interfaces that come up".to_owned()),
+        (false, false) => {}
+    }
+    let listening = node.tcp().and_then(|it| it.listening);
+    let listening = listening.filter(|it| !it.ip().is_loopback());
+    on.extend(listening.map(|it| format!("TCP {it}")));
+    (!on.is_empty()).then(|| on.join(", "))
 }
 
 /// Parses the id of a single component.

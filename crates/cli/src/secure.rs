@@ -1,7 +1,6 @@
 //! Flags and settings of the secure link: this node's key, the keys that it trusts, and the peers.
 
 mod files;
-mod table;
 
 use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
@@ -13,16 +12,16 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::link::{Interface, Interfaces, Ip, interface};
 use jaus::node::{Config, Tcp, units};
-use jaus::rights::Rules;
+use jaus::rights::{self, RuleError, Rules};
 use jaus_audit::AuditLog;
-use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, TrustFile, edit};
+use jaus_secure::{Announce, Credentials, Key, Peer, SecureLink, Trust, TrustFile, edit};
 use serde::Deserialize;
 
 use files::Certificates;
 pub use files::KeyFiles;
-pub use table::table_with;
 
 use super::failure::Failure;
+use super::permissions::table_with;
 use super::settings;
 
 /// The UDP port of secure links.
@@ -318,6 +317,12 @@ impl Secure {
         self.peers.iter().map(|Address(peer)| *peer).collect()
     }
 
+    /// Whether the link connects to peers, and several programs may have the same settings at once.
+    pub fn only_dials(&self) -> bool {
+        let is_dialling = !self.peers.is_empty() && self.announce.is_none();
+        is_dialling && self.listen.is_none()
+    }
+
     /// The node's settings beside the link: plain JUDP and JTCP only on interfaces that they name.
     ///
     /// # Errors
@@ -347,6 +352,9 @@ impl Secure {
     /// # Errors
     /// A key, certificate or trust file that cannot be used, or an address that cannot be listened on.
     pub fn open(&self, node: JausId, log: Option<AuditLog>) -> Result<SecureLink, Failure> {
+        let table = table_with(&self.jsidl)?;
+        // Before the file is written.
+        known_names(&TrustFile::of(Trust::new(self.trust.clone())), &table)?;
         trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
         let credentials = self.credentials()?;
         let any = || match self.peers.first() {
@@ -354,7 +362,8 @@ impl Secure {
             _ => SocketAddr::from(([0; 4], 0)),
         };
         let listen = self.listen.map_or_else(any, |Address(address)| address);
-        let mut settings = jaus_secure::Settings::new(listen).table(table_with(&self.jsidl)?);
+        known_names(&self.trust()?, &table)?;
+        let mut settings = jaus_secure::Settings::new(listen).table(table);
         for peer in self.peers() {
             settings = settings.connect(peer);
         }
@@ -369,6 +378,18 @@ impl Secure {
             Some(log) => link.audited(log),
             None => link,
         })
+    }
+}
+
+/// Checks that the definitions in use have the names in the rules of the peers. Other faults of the rules are
+/// logged while the node runs.
+fn known_names(trust: &TrustFile, table: &rights::Table) -> Result<(), Failure> {
+    match trust.verify(table) {
+        Err((peer, error @ RuleError::Name(_))) => Err(Failure::new(format!(
+            "the rules of the trusted peer `{peer}`: {error}. Definitions of your own are named by \
+             --secure-jsidl"
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus::rights::Rules;
 use jaus_cli::runtime::{between, duration_within};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ros2::bridge::vehicle::Selection;
@@ -56,18 +57,13 @@ struct Flags {
     #[arg(long, value_name = "HZ", default_value = "10", value_parser = |text: &str| between(text, 0.1, 1000.0))]
     rate: f64,
 
-    /// Let ROS command the vehicle with this authority, from 0 to 255; the higher one wins
-    /// [default: no commands]
-    #[arg(long, value_name = "AUTHORITY")]
-    control: Option<u8>,
-
-    /// Let ROS set emergencies without --control, which includes this
-    #[arg(long)]
-    allow_emergency: bool,
-
-    /// Let ROS clear the emergencies that it has set
-    #[arg(long)]
-    allow_clear: bool,
+    /// What everybody on the ROS network may do, such as "control=127 clear-emergency" [default: watch]
+    ///
+    /// observe: set emergencies, too. control=AUTHORITY: drive and set goals, with control of this
+    /// authority; the higher one wins. clear-emergency: clear the emergencies that ROS has set. with=IDS,
+    /// only=NAMES and except=NAMES limit this, as in the file of trusted keys.
+    #[arg(long, value_name = "RIGHTS")]
+    allow: Option<Rules>,
 
     /// The highest speed of cmd_vel, and the speed that a primitive driver reaches with full effort,
     /// in m/s
@@ -173,9 +169,9 @@ impl Flags {
             only: self.component.clone(),
         });
         settings.rate_hz = self.rate;
-        settings.control = self.control;
-        settings.allow_emergency = self.allow_emergency;
-        settings.allow_clear = self.allow_clear;
+        if let Some(rules) = &self.allow {
+            settings.rules = rules.clone();
+        }
         settings.drive.timeout = self.timeout;
         settings.drive.hold = self.hold;
         settings.drive.limits.speed = self.max_speed;
@@ -197,10 +193,10 @@ impl Ready for Flags {
     const ABOUT: &'static str = "Bridge between a JAUS vehicle and ROS 2 over zenoh (rmw_zenoh)";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ros2 --vehicle 101                              read-only, router on this host\n  \
-        jaus-ros2 --vehicle 101 --control 127 --tf           ROS drives: /v101/cmd_vel, /v101/goal_pose\n  \
+        jaus-ros2 --vehicle 101 --allow control=127 --tf     ROS drives: /v101/cmd_vel, /v101/goal_pose\n  \
         jaus-ros2 --vehicle 101 --connect tcp/192.168.7.2:7447 --domain 7\n  \
         jaus-ros2 --vehicle 101 --report ReportWrenchEffort --report ReportStatus --rate 5\n  \
-        jaus-ros2 --vehicle 101 --control 127 --max-speed 6 --max-yaw-rate 0.8 --allow-clear";
+        jaus-ros2 --vehicle 101 --max-speed 6 --max-yaw-rate 0.8 --allow \"control=127 clear-emergency\"";
     const ID: JausId = JausId::new(253, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
     const SUBSYSTEM: &'static str = "ROS 2 bridge";

@@ -17,7 +17,7 @@ use zenoh::config::Config;
 
 pub use entity::{Node, Publisher, Received, Subscription, SubscriptionCounters};
 
-use crate::graph::{Entity, EntityKind, GREATEST_DOMAIN, NameError, NodeName};
+use crate::graph::{Entity, EntityKind, GREATEST_DOMAIN, Gid, NameError, NodeName};
 use crate::interface::TypeName;
 use shared::Shared;
 
@@ -146,6 +146,15 @@ impl Ros {
         let entities = state.graph.of_topic(kind, topic);
         let is_other = |it: &&Entity| Some(&it.token.session) != state.session.as_ref();
         entities.filter(is_other).map(part).collect()
+    }
+
+    /// The publisher of a topic with this identity, if its token exists. Who sends with a made-up identity has
+    /// none.
+    #[must_use]
+    pub fn publisher(&self, topic: &str, gid: Gid) -> Option<Entity> {
+        let state = self.shared().lock();
+        let mut publishers = state.graph.of_topic(EntityKind::Publisher, topic);
+        publishers.find(|it| it.gid == gid).cloned()
     }
 
     /// A number that changes when the connection, or the publishers and subscriptions of others change.

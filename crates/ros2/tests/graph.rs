@@ -176,10 +176,17 @@ fn no_entity_is_left_out_for_its_quality_of_service() {
     assert_eq!(best_available, Qos::default().with_depth(7));
 }
 
+/// A token like that of the talker, with these numbers of its session and in it.
+fn numbered(session: u32, number: u32) -> String {
+    talker()
+        .replace("8b20917502ee955ac4476e0266340d5c", &format!("{session:x}"))
+        .replace("/0/10/MP", &format!("/0/{number}/MP"))
+}
+
 #[test]
 fn the_tokens_of_a_topic_have_a_bound_that_leaves_other_topics_alone() {
     let mut graph = Graph::default();
-    let key = |number: u32| talker().replace("/0/10/MP", &format!("/0/{number}/MP"));
+    let key = |number: u32| numbered(1 + number / 256, number);
     for number in 0..1025 {
         assert_eq!(graph.insert(&key(number)), Ok(number < 1024), "{number}");
     }
@@ -190,6 +197,30 @@ fn the_tokens_of_a_topic_have_a_bound_that_leaves_other_topics_alone() {
     );
     assert!(graph.remove(&key(0)));
     assert_eq!(graph.insert(&key(1024)), Ok(true));
+}
+
+#[test]
+fn a_session_leaves_room_for_the_tokens_of_others() {
+    let mut graph = Graph::default();
+    for number in 0..300 {
+        let is_room = number < 256;
+        assert_eq!(graph.insert(&numbered(1, number)), Ok(is_room), "{number}");
+    }
+    // The id of another session may begin alike.
+    for session in [2, 0x10, 0x1f] {
+        assert_eq!(graph.insert(&numbered(session, 1)), Ok(true));
+    }
+    let of_topic = |number: u32, session: u32| {
+        let topic = format!("%topic{}", number / 100);
+        numbered(session, number).replace("%chatter", &topic)
+    };
+    let mut graph = Graph::default();
+    for number in 0..5000 {
+        let is_room = number < 4096;
+        let inserted = graph.insert(&of_topic(number, 1));
+        assert_eq!(inserted, Ok(is_room), "{number}");
+    }
+    assert_eq!(graph.insert(&of_topic(0, 2)), Ok(true));
 }
 
 #[test]

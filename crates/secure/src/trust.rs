@@ -25,7 +25,7 @@ use jaus_files::{Followed, Readers};
 use crate::certificate::Certificate;
 use crate::follow::{REFUSING, follow};
 use crate::key::{KeyError, PublicKey};
-use jaus::rights::{RuleError, Rules};
+use jaus::rights::{RuleError, Rules, Table};
 
 /// What stands in place of the key in a line for a certificate.
 pub(crate) const CERTIFICATE: &str = "certificate";
@@ -195,6 +195,19 @@ impl Trust {
             }
         }
         Ok(trust)
+    }
+
+    /// Checks the names in the rules of all lines against the definitions in use: see [`Rules::verify`].
+    ///
+    /// # Errors
+    /// The name of the first line that is wrong, and why.
+    pub fn verify(&self, table: &Table) -> Result<(), (String, RuleError)> {
+        let peers = self.peers.iter().map(|it| (&it.name, &it.rules));
+        let grants = self.grants.iter().map(|it| (&it.name, &it.rules));
+        peers.chain(grants).try_for_each(|(name, rules)| {
+            let verified = rules.verify(table);
+            verified.map_err(|error| (name.clone(), error))
+        })
     }
 
     /// The peer with this key.
@@ -387,6 +400,14 @@ impl TrustFile {
     /// The peer with this certificate, which has been verified.
     pub(crate) fn certified(&self, certificate: &Certificate) -> Peer {
         self.0.get().certified(certificate)
+    }
+
+    /// Checks the names in its rules: see [`Trust::verify`].
+    ///
+    /// # Errors
+    /// As [`Trust::verify`].
+    pub fn verify(&self, table: &Table) -> Result<(), (String, RuleError)> {
+        self.0.get().verify(table)
     }
 
     /// The number of trusted keys.

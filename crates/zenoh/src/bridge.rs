@@ -15,6 +15,7 @@ use crate::exchange::{Exchange, Settings};
 use crate::key::BridgeId;
 use crate::link::{NAME, Shared, ZenohLink};
 use crate::network::{self, NetworkError, NetworkSettings};
+use crate::proof;
 use crate::view::{MOST_WAITING, Viewer};
 
 /// How often the table of this side's components is renewed.
@@ -51,10 +52,17 @@ impl Bridge {
     /// A bridge with these settings. It connects when it runs.
     ///
     /// # Errors
-    /// Settings that zenoh cannot use.
+    /// Settings that zenoh cannot use, or ids with rights on a network that proves nobody's identity.
     pub fn new(settings: Settings, network: &NetworkSettings) -> Result<Self, NetworkError> {
+        let id = BridgeId::random();
+        let mut network = network.clone();
+        // So that its keys tell which session of the network it is.
+        network.id.get_or_insert_with(|| id.to_string());
         let config = network.config()?;
-        let exchange = Exchange::new(BridgeId::random(), settings);
+        if !settings.accept.only_watches() {
+            check_network(&config, settings.trusts_network)?;
+        }
+        let exchange = Exchange::new(id, settings);
         let shared = Arc::new(Shared::new(exchange));
         Ok(Self { shared, config })
     }
@@ -80,6 +88,21 @@ impl Bridge {
             }
             exchange.expire(now);
         });
+    }
+}
+
+/// Checks that links prove who is at their other end, or warns if the network is trusted nevertheless.
+fn check_network(config: &zenoh::Config, is_trusted: bool) -> Result<(), NetworkError> {
+    match proof::check(config) {
+        Ok(()) => Ok(()),
+        Err(reason) if is_trusted => {
+            tracing::warn!(
+                "--trust-network: whoever reaches this zenoh network can act as the ids of --accept, \
+                 because {reason}"
+            );
+            Ok(())
+        }
+        Err(reason) => Err(NetworkError::Unproven { reason }),
     }
 }
 
@@ -135,5 +158,43 @@ impl Part for Bridge {
                 () = resident.closing() => return Err(PartError::NodeStopped),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use jaus::rights::Acceptance;
+
+    use super::*;
+
+    fn bridge(grant: &str, trusts_network: bool) -> Result<Bridge, NetworkError> {
+        let mut settings = Settings::default();
+        settings.accept = Acceptance::new([grant.parse().unwrap()]);
+        settings.trusts_network = trusts_network;
+        let mut network = NetworkSettings::default();
+        network.connect.push("tcp/127.0.0.1:7447".to_owned());
+        Bridge::new(settings, &network)
+    }
+
+    #[test]
+    fn ids_get_no_rights_on_a_network_without_certificates_unless_it_is_trusted() {
+        let error = bridge("60 control=127", false).unwrap_err().to_string();
+        assert!(error.contains("tcp/127.0.0.1:7447"), "{error}");
+        assert!(error.contains("--trust-network"), "{error}");
+        assert!(bridge("60 observe", false).is_err(), "it sets emergencies");
+        assert!(bridge("60 control=127", true).is_ok());
+        assert!(bridge("60 except=SetEmergency", false).is_ok());
+    }
+
+    #[test]
+    fn the_id_of_a_bridge_is_that_of_its_zenoh_session() {
+        let bridge = bridge("60 except=SetEmergency", false).unwrap();
+        let id = bridge.config.get_json("id").unwrap();
+        let key = bridge
+            .shared
+            .lock()
+            .exchange
+            .token_key("60.1.1".parse().unwrap());
+        assert!(key.ends_with(id.trim_matches('"')), "{key} {id}");
     }
 }

@@ -13,10 +13,12 @@ jaus::counters! {
     OwnId = "dropped: id of this side",
     /// Dropped: a message or token with an id for which another bridge speaks.
     OtherBridge = "dropped: id for which another bridge speaks",
+    /// Dropped: a message with an id whose token its bridge has not declared.
+    NotAnnounced = "dropped: id without a token",
     /// Dropped: a message or token from an id that is not accepted.
     NotAccepted = "dropped: id that is not accepted",
     RuleForbids = "dropped: forbidden by the rights of its sender",
-    /// Dropped: a message or token, because the table of remote components is full.
+    /// Dropped: a token, because its bridge or all together have too many components.
     RemoteTableFull = "dropped: table of remote components full",
     /// Dropped: a message from outside that the node did not take in time.
     InboxFull = "dropped: node too slow",

@@ -4,7 +4,9 @@
 //! side, and it enters only if its source belongs to the bridge that publishes it and not to this
 //! side. So there are no loops, however many bridges join the same two networks.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+mod presence;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -16,10 +18,12 @@ use jaus::messages::core::QueryIdentification;
 use jaus::rights::{Acceptance, Refusal, Table, Unaccepted, denial};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
 
+use crate::arrivals::Arrivals;
 use crate::counters::{Counter, Counters};
 use crate::key::{BridgeId, Key, Label, Prefix, Recipient};
+use crate::notices::Notices;
 use crate::queue::{Command, Publication, Queue};
-use crate::remotes::Remotes;
+use crate::remotes::{MOST_OF_BRIDGE, Remotes};
 use crate::thin::{MinPeriod, Thinner, Verdict};
 
 /// The settings of a bridge.
@@ -30,23 +34,19 @@ pub struct Settings {
     pub prefix: Prefix,
     /// The ids that may come from the zenoh side, and their rights.
     pub accept: Acceptance,
+    /// Whether `accept` may let ids do more than watch although the links of the zenoh network do not prove
+    /// who is there.
+    pub trusts_network: bool,
     /// The ids of this side that the other sides see, with wildcards; all if empty.
     pub offer: Vec<JausId>,
     /// Minimum periods of messages to the zenoh side.
     pub min_periods: Vec<MinPeriod>,
 }
 
-/// The most components of this side.
-const MOST_LOCAL: usize = 4096;
 /// How long a component belongs to this side after it was last heard.
 const LOCAL_FOR: Duration = Duration::from_secs(10);
-/// The most messages from outside, and octets of them, that wait for the node.
-const MOST_ARRIVALS: usize = 4096;
-const MOST_ARRIVED_OCTETS: usize = 16 << 20;
 /// The largest payload: a UDP datagram.
 const LARGEST: usize = 65_507;
-/// The most kinds of refused messages that are logged.
-const MOST_WARNINGS: usize = 256;
 
 /// A component of this side.
 #[derive(Debug)]
@@ -87,10 +87,12 @@ pub struct Exchange {
     served: BTreeSet<u16>,
     thinner: Thinner,
     queue: Queue,
-    arrivals: VecDeque<Arrival>,
-    arrived_octets: usize,
+    arrivals: Arrivals,
     phase: Phase,
-    warned: BTreeSet<(JausId, u16)>,
+    /// The kinds of refused messages that were logged.
+    refused: Notices<(JausId, u16)>,
+    /// The bridges that were logged because they use an id without speaking for it.
+    intruders: Notices<(JausId, BridgeId)>,
     counters: Counters,
 }
 
@@ -108,10 +110,10 @@ impl Exchange {
             served: BTreeSet::new(),
             thinner: Thinner::new(&settings.min_periods),
             queue: Queue::default(),
-            arrivals: VecDeque::new(),
-            arrived_octets: 0,
+            arrivals: Arrivals::default(),
             phase: Phase::Opening,
-            warned: BTreeSet::new(),
+            refused: Notices::default(),
+            intruders: Notices::default(),
             counters: Counters::default(),
         }
     }
@@ -203,37 +205,29 @@ impl Exchange {
         if self.is_local(now, source) {
             return Err(Counter::OwnId);
         }
-        if self.arrivals.len() >= MOST_ARRIVALS
-            || self.arrived_octets + payload.len() > MOST_ARRIVED_OCTETS
-        {
-            return Err(Counter::InboxFull);
+        let checked = self.accept.check(&frame, &Table::default());
+        if checked == Err(Unaccepted::Source) {
+            return Err(Counter::NotAccepted);
         }
-        match self.accept.check(&frame, &Table::default()) {
-            Ok(()) => {}
-            Err(Unaccepted::Source) => return Err(Counter::NotAccepted),
-            Err(Unaccepted::Rule(refusal)) => {
-                self.remotes.hear(now, from, source)?;
-                self.refuse(now, from, &frame, refusal);
-                return Err(Counter::RuleForbids);
-            }
+        let session = self.remotes.hear(from, source);
+        let session = session.inspect_err(|_| self.note_intruder(now, key, source, from))?;
+        if let Err(Unaccepted::Rule(refusal)) = checked {
+            self.refuse(now, from, &frame, refusal);
+            return Err(Counter::RuleForbids);
         }
-        let session = self.remotes.hear(now, from, source)?;
-        self.arrived_octets += payload.len();
-        self.arrivals.push_back(Arrival::Datagram {
-            session,
-            octets: payload.clone(),
-        });
-        self.counters.add(Counter::Received);
+        match self.arrivals.push(session, payload.clone()) {
+            true => self.counters.add(Counter::Received),
+            false => return Err(Counter::InboxFull),
+        }
         Ok(())
     }
 
     /// Logs a refusal, and answers a request for control.
     fn refuse(&mut self, now: Instant, from: BridgeId, frame: &Frame, refusal: Refusal) {
         let code = frame.code().unwrap_or_default();
-        let is_new = self.warned.len() < MOST_WARNINGS && self.warned.insert((frame.source, code));
-        if is_new {
+        if self.refused.is_due(now, (frame.source, code)) {
             let (source, destination) = (frame.source, frame.destination);
-            let reason = reason(refusal);
+            let reason = remedy(refusal, "the rights of its --accept");
             tracing::warn!("{code:04X}h from {source} to {destination} refused: {reason}");
         }
         if let Some(denial) = denial(frame)
@@ -241,37 +235,6 @@ impl Exchange {
         {
             self.publish(now, &denial, None, Recipient::Bridge(from));
         }
-    }
-
-    /// A liveliness token was declared, or undeclared.
-    pub fn handle_token(&mut self, now: Instant, key: &str, is_alive: bool) {
-        let Some(Key::Live { component, from }) = self.prefix.parse(key) else {
-            self.counters.add(Counter::UnknownKey);
-            return;
-        };
-        if from == self.id {
-            return;
-        }
-        if !is_alive {
-            let closed = self.remotes.withdraw(now, from, component);
-            self.arrivals.extend(closed.map(Arrival::Closed));
-            return;
-        }
-        let outcome = if !self.accept.accepts(component) {
-            Err(Counter::NotAccepted)
-        } else if self.is_local(now, component) {
-            self.remotes.claim(from, component);
-            Err(Counter::OwnId)
-        } else {
-            self.remotes.announce(now, from, component)
-        };
-        if let Err(counter) = outcome {
-            if self.warned.len() < MOST_WARNINGS && self.warned.insert((component, 0)) {
-                tracing::warn!("the token of {component} from bridge {from} is ignored: {counter}");
-            }
-            self.counters.add(counter);
-        }
-        self.repeat_calls(now);
     }
 
     fn is_local(&self, now: Instant, id: JausId) -> bool {
@@ -297,7 +260,7 @@ impl Exchange {
             local.heard = heard.max(local.heard);
             return Ok(());
         }
-        if self.locals.len() >= MOST_LOCAL {
+        if self.locals.len() >= MOST_OF_BRIDGE {
             return Err(Counter::LocalTableFull);
         }
         self.locals.insert(id, Local { heard, call: None });
@@ -463,11 +426,8 @@ impl Exchange {
         self.thinner.poll_timeout()
     }
 
-    /// Forgets components and bridges that have been silent. Call it about once a second.
+    /// Forgets components of this side that have been silent. Call it about once a second.
     pub fn expire(&mut self, now: Instant) {
-        let closed = self.remotes.expire(now);
-        self.arrivals
-            .extend(closed.into_iter().map(Arrival::Closed));
         let all: Vec<_> = self.locals.keys().copied().collect();
         for id in all {
             if self.is_local(now, id) {
@@ -475,7 +435,7 @@ impl Exchange {
             }
             self.locals.remove(&id);
             self.queue.declare(Command::Withdraw(id));
-            self.remotes.release(now, id);
+            self.release(id);
         }
         self.repeat_calls(now);
     }
@@ -491,11 +451,7 @@ impl Exchange {
 
     /// The next message or closed session for the node.
     pub fn poll_arrival(&mut self) -> Option<Arrival> {
-        let arrival = self.arrivals.pop_front()?;
-        if let Arrival::Datagram { octets, .. } = &arrival {
-            self.arrived_octets -= octets.len();
-        }
-        Some(arrival)
+        self.arrivals.pop()
     }
 
     /// The next command for the zenoh session.
@@ -531,9 +487,10 @@ fn waits(frame: &Frame) -> bool {
         || frame.flags.data() != DataControl::Single
 }
 
-/// Why the rights of a sender forbid a message, with the remedy.
-fn reason(refusal: Refusal) -> String {
-    let remedy = |right: &str| format!("add {right} to the rights of its --accept");
+/// Why rights forbid a message, with the remedy; `rights` is where they are, such as `--allow`.
+#[must_use]
+pub fn remedy(refusal: Refusal, rights: &str) -> String {
+    let remedy = |right: &str| format!("add {right} to {rights}");
     match refusal {
         Refusal::Command => remedy("`command` or `control=AUTHORITY`"),
         Refusal::Control => remedy("`control=AUTHORITY`"),
@@ -541,10 +498,10 @@ fn reason(refusal: Refusal) -> String {
         Refusal::ClearAnyEmergency => remedy("`clear-emergency=any`"),
         Refusal::Configure => remedy("`configure`"),
         Refusal::Authority { asked, most } => {
-            format!("authority {asked}, but its --accept allows at most {most}")
+            format!("authority {asked}, but at most {most} by {rights}")
         }
         Refusal::Unknown => remedy("`also=` and its code"),
-        _ => "another rule of its --accept forbids it".to_owned(),
+        _ => format!("not allowed by {rights}"),
     }
 }
 

@@ -57,7 +57,8 @@ impl FromStr for Prefix {
     }
 }
 
-/// Identifies a running bridge: 16 hexadecimal digits. A restarted bridge has another one.
+/// Identifies a running bridge: 16 hexadecimal digits, which are the id of its zenoh session too. A restarted
+/// bridge has another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BridgeId(u64);
 
@@ -68,10 +69,10 @@ impl BridgeId {
         Self(number)
     }
 
-    /// A random one.
+    /// A random one. Its first digit is not 0, because ids of zenoh have no leading zeros.
     #[must_use]
     pub fn random() -> Self {
-        Self(RandomState::new().build_hasher().finish())
+        Self(RandomState::new().build_hasher().finish() | 1 << 63)
     }
 
     fn parse(text: &str) -> Option<Self> {

@@ -13,12 +13,15 @@
 //! `docs/zenoh.md` is the guide to the program.
 #![forbid(unsafe_code)]
 
+mod arrivals;
 mod bridge;
 mod counters;
 mod exchange;
 pub mod key;
 mod link;
 mod network;
+mod notices;
+mod proof;
 mod queue;
 mod remotes;
 mod thin;
@@ -26,8 +29,9 @@ mod view;
 
 pub use bridge::Bridge;
 pub use counters::{Counter, Counters};
-pub use exchange::{Exchange, Settings};
+pub use exchange::{Exchange, Settings, remedy};
 pub use link::ZenohLink;
-pub use network::{NetworkError, NetworkSettings};
+pub use network::{NetworkError, NetworkSettings, open_session};
+pub use proof::check as check_proof;
 pub use queue::{Command, Publication};
 pub use thin::{MinPeriod, MinPeriodError};

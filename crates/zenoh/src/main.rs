@@ -34,12 +34,17 @@ struct Flags {
     prefix: Prefix,
 
     /// Accept these ids from the zenoh side, with these rights, such as "60 control=127" or
-    /// "60.1.1 command" (repeatable; the first that matches counts) [default: all ids, observe]
+    /// "60.1.1 command" (repeatable; the first that matches counts) [default: all ids, which may watch]
     ///
     /// The rights are observe, command, control=AUTHORITY, clear-emergency, configure, with=IDS,
     /// only=NAMES and except=NAMES, as in the file of trusted keys.
     #[arg(long, value_name = "IDS RIGHTS")]
     accept: Vec<Grant>,
+
+    /// Let --accept give more rights than to watch although the links of zenoh are not all TLS with client
+    /// certificates: whoever reaches the network can then act as these ids
+    #[arg(long)]
+    trust_network: bool,
 
     /// Show only these ids of this side to the zenoh side, such as 101 or 101.1.255 (repeatable)
     /// [default: all]
@@ -65,10 +70,10 @@ impl Ready for Flags {
     const PROGRAM: &'static str = "jaus-zenoh";
     const ABOUT: &'static str = "Bridge between JAUS systems over a zenoh network";
     const EXAMPLES: &'static str = "Examples:\n  \
-        jaus-zenoh --id 101.250.1 --listen tcp/0.0.0.0:7447 --accept \"60 control=127\"\n  \
+        jaus-zenoh --id 101.250.1 --listen tcp/0.0.0.0:7447             the others watch\n  \
         jaus-zenoh --id 60.250.1 --connect tcp/192.168.7.2:7447\n  \
+        jaus-zenoh --id 101.250.1 --zenoh-config tls.json5 --accept \"60 control=127\"\n  \
         jaus-zenoh --id 101.250.1 --connect tcp/r1:7447 --connect tcp/r2:7447   two routers\n  \
-        jaus-zenoh --id 101.250.1 --zenoh-config tls.json5\n  \
         jaus-zenoh --id 101.250.1 --connect tcp/r1:7447 --min-period ReportVelocityState=1s";
     const ID: JausId = JausId::new(251, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
@@ -84,6 +89,7 @@ impl Ready for Flags {
         if !self.accept.is_empty() {
             settings.accept = Acceptance::new(self.accept);
         }
+        settings.trusts_network = self.trust_network;
         settings.offer = self.offer;
         settings.min_periods = self.min_period;
         let mut network = NetworkSettings::default();

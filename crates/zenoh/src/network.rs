@@ -17,7 +17,7 @@ use zenoh::config::{Config, EndPoint};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::qos::{self, CongestionControl};
-use zenoh::query::Queryable;
+use zenoh::query::{QueryTarget, Queryable, Reply};
 use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
@@ -36,6 +36,8 @@ pub struct NetworkSettings {
     pub connect: Vec<String>,
     /// Endpoints to listen on, such as `tcp/0.0.0.0:7447`.
     pub listen: Vec<String>,
+    /// The id of the session in the zenoh network, unless the file sets one; a random one if `None`.
+    pub id: Option<String>,
 }
 
 /// Why there are no settings for a zenoh session.
@@ -61,6 +63,16 @@ pub enum NetworkError {
     Endpoint {
         /// The endpoint.
         endpoint: String,
+    },
+    /// Ids get rights on a network that proves nobody's identity.
+    #[error(
+        "--accept lets ids do more than observe, and {reason}: whoever reaches this zenoh network could \
+         act as these ids. Use TLS with client certificates on all links (--zenoh-config), or state \
+         --trust-network"
+    )]
+    Unproven {
+        /// The setting that admits links without TLS or without client certificates.
+        reason: String,
     },
     /// zenoh refuses a setting.
     #[error("zenoh refuses the setting {setting}: {reason}")]
@@ -96,6 +108,10 @@ impl NetworkSettings {
             if self.file.is_none() || !endpoints.is_empty() {
                 insert(&mut config, setting, &list(endpoints)?)?;
             }
+        }
+        let has_id = config.get_json("id").is_ok_and(|id| id != "null");
+        if let Some(id) = self.id.as_deref().filter(|_| !has_id) {
+            insert(&mut config, "id", &serde_json::Value::from(id).to_string())?;
         }
         Ok(config)
     }
@@ -143,20 +159,36 @@ const RETRY: Duration = Duration::from_secs(1);
 /// How long the thread waits for work. It is woken before.
 const TURN: Duration = Duration::from_secs(1);
 
-/// Runs the session until the bridge closes it. A thread calls it.
-pub(crate) fn run(shared: &Arc<Shared>, config: &Config, requests: &mpsc::Sender<Request>) {
+/// Opens a session, and tries again every second. `wait` waits for that time, and returns whether to try again.
+pub fn open_session<S>(
+    mut open: impl FnMut() -> zenoh::Result<S>,
+    mut wait: impl FnMut(Duration) -> bool,
+) -> Option<S> {
     let mut has_warned = false;
-    while !shared.lock().is_closing {
-        match Running::open(shared.clone(), config.clone(), requests.clone()) {
-            Ok(running) => return running.run(),
+    loop {
+        match open() {
+            Ok(session) => return Some(session),
             Err(error) if !has_warned => {
                 tracing::warn!(%error, "no zenoh network yet: trying again every second");
                 has_warned = true;
             }
             Err(error) => tracing::debug!(%error, "no zenoh network yet"),
         }
+        if !wait(RETRY) {
+            return None;
+        }
+    }
+}
+
+/// Runs the session until the bridge closes it. A thread calls it.
+pub(crate) fn run(shared: &Arc<Shared>, config: &Config, requests: &mpsc::Sender<Request>) {
+    let open = || Running::open(shared.clone(), config.clone(), requests.clone());
+    let wait = |time| {
         let state = shared.lock();
-        drop(shared.wait(state, RETRY));
+        !state.is_closing && !shared.wait(state, time).is_closing
+    };
+    if let Some(running) = open_session(open, wait) {
+        running.run();
     }
 }
 
@@ -250,9 +282,31 @@ impl Running {
                 }
             }
             Command::Serve(subsystem) => self.serve(subsystem)?,
+            Command::Identify(token) => self.identify(token)?,
             Command::Publish(publication) => self.publish(publication)?,
         }
         Ok(())
+    }
+
+    /// Asks the routers which sessions have declared a token, and logs what they say. Nobody answers if the
+    /// administration space of the routers is off, or closed to this session.
+    fn identify(&self, token: String) -> zenoh::Result<()> {
+        let selector = format!("@/*/router/token/{token}");
+        let log = move |reply: Reply| {
+            if let Ok(sample) = reply.result()
+                && let Some((router, sessions)) = declared_by(sample)
+            {
+                tracing::warn!(
+                    "{token} was declared by zenoh sessions {sessions}, says router {router}"
+                );
+            }
+        };
+        self.session
+            .get(selector)
+            .target(QueryTarget::All)
+            .timeout(PATIENCE)
+            .callback(log)
+            .wait()
     }
 
     fn publish(&self, publication: Publication) -> zenoh::Result<()> {
@@ -294,6 +348,27 @@ impl Running {
         self.queryables.push(queryable.wait()?);
         Ok(())
     }
+}
+
+/// How long routers may take to say who has declared a token.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// The most sessions with one token that are named.
+const MOST_NAMED: usize = 8;
+
+/// The router that answers, and the ids of the sessions at it that have declared a token.
+fn declared_by(answer: &Sample) -> Option<(String, String)> {
+    let router = answer.key_expr().as_str().split('/').nth(1)?;
+    let sources: BTreeMap<String, Vec<String>> =
+        serde_json::from_slice(&answer.payload().to_bytes()).ok()?;
+    // Other routers only pass it on.
+    let at_it = sources.into_iter().filter(|(kind, _)| kind != "routers");
+    let is_id = |id: &String| id.len() <= 32 && id.chars().all(|it| it.is_ascii_hexdigit());
+    let ids = at_it
+        .flat_map(|(_, ids)| ids)
+        .filter(is_id)
+        .take(MOST_NAMED);
+    let ids: Vec<_> = ids.collect();
+    (!ids.is_empty() && is_id(&router.to_owned())).then(|| (router.to_owned(), ids.join(", ")))
 }
 
 /// The priority of zenoh for a priority of JAUS. Views yield to all messages.
@@ -351,6 +426,7 @@ mod tests {
             file: None,
             connect: owned(connect),
             listen: owned(listen),
+            ..NetworkSettings::default()
         }
     }
 

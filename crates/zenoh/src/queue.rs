@@ -35,6 +35,8 @@ pub enum Command {
     Withdraw(JausId),
     /// Answer requests for views of this subsystem.
     Serve(u16),
+    /// Ask the network which sessions have declared a token, to log them. Its key.
+    Identify(String),
     /// Publish a sample.
     Publish(Publication),
 }
@@ -46,7 +48,8 @@ const MOST_OCTETS: usize = 8 << 20;
 /// How long a sample may wait. Late commands do harm, and messages that matter are repeated.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
-/// The commands that wait. Tokens and requests are bounded by the tables of the exchange.
+/// The commands that wait. Tokens and requests are bounded by the tables of the exchange, and questions by
+/// the rate of its log.
 #[derive(Debug, Default)]
 pub(crate) struct Queue {
     declarations: VecDeque<Command>,

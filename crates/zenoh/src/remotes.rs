@@ -1,7 +1,6 @@
 //! The bridges on the other side, and which of them speaks for which component.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
@@ -9,45 +8,72 @@ use jaus::endpoint::SessionId;
 use crate::counters::Counter;
 use crate::key::BridgeId;
 
-/// The most remote components, of all bridges together.
+/// The most remote components, of all bridges together, and the most tokens that wait for theirs.
 const MOST_COMPONENTS: usize = 16_384;
-/// The most tokens that wait for their component.
-const MOST_CLAIMS: usize = 4096;
-/// How long a bridge without a token is remembered after its last message. Its tokens may arrive
-/// after its messages.
-const WITHOUT_TOKENS: Duration = Duration::from_secs(10);
+/// The most components of one bridge, and the most tokens of one that wait: as many as a bridge may have
+/// on its side. A bridge alone cannot fill the tables.
+pub(crate) const MOST_OF_BRIDGE: usize = 4096;
 
 /// A bridge that speaks for at least one component.
 #[derive(Debug)]
 struct Remote {
     session: SessionId,
-    /// Its components, and whether each has a token.
-    components: BTreeMap<JausId, bool>,
-    heard: Instant,
-}
-
-impl Remote {
-    fn has_tokens(&self) -> bool {
-        self.components.values().any(|&has_token| has_token)
-    }
+    components: BTreeSet<JausId>,
 }
 
 /// The table of bridges.
 ///
-/// A component belongs to the first bridge that speaks for it, until that bridge withdraws it or is
-/// gone. Then it belongs to another one that has declared its token.
+/// A component belongs to the first bridge that has declared its token, until that bridge withdraws it or
+/// is gone. Then it belongs to another one that has declared its token. Messages without a token count
+/// for nothing.
 #[derive(Debug, Default)]
 pub(crate) struct Remotes {
     bridges: BTreeMap<BridgeId, Remote>,
     sessions: HashMap<SessionId, BridgeId>,
     owners: HashMap<JausId, BridgeId>,
-    /// Tokens of components that belong to another bridge or to this side: those of a bridge that
-    /// was started again may come before the old ones are gone.
-    claims: BTreeSet<(JausId, BridgeId)>,
+    claims: Claims,
     /// The bridges that were found since the last look.
     found: Vec<BridgeId>,
     /// The number of the latest session.
     latest: u64,
+}
+
+/// Tokens of components that belong to another bridge or to this side: those of a bridge that was started
+/// again may come before the old ones are gone.
+#[derive(Debug, Default)]
+struct Claims {
+    waiting: BTreeSet<(JausId, BridgeId)>,
+    of_bridge: BTreeMap<BridgeId, usize>,
+}
+
+impl Claims {
+    fn insert(&mut self, component: JausId, bridge: BridgeId) {
+        let of_bridge = self.of_bridge.get(&bridge).copied().unwrap_or(0);
+        let has_room = self.waiting.len() < MOST_COMPONENTS && of_bridge < MOST_OF_BRIDGE;
+        if has_room && self.waiting.insert((component, bridge)) {
+            *self.of_bridge.entry(bridge).or_default() += 1;
+        }
+    }
+
+    fn remove(&mut self, component: JausId, bridge: BridgeId) {
+        if self.waiting.remove(&(component, bridge))
+            && let Some(count) = self.of_bridge.get_mut(&bridge)
+        {
+            *count -= 1;
+            if *count == 0 {
+                self.of_bridge.remove(&bridge);
+            }
+        }
+    }
+
+    /// A bridge that has declared the token of this component.
+    fn of(&self, component: JausId) -> Option<BridgeId> {
+        let first = (component, BridgeId::new(0));
+        let claim = self.waiting.range(first..).next();
+        claim
+            .filter(|(claimed, _)| *claimed == component)
+            .map(|(_, bridge)| *bridge)
+    }
 }
 
 impl Remotes {
@@ -71,24 +97,25 @@ impl Remotes {
         self.sessions.get(&session).copied()
     }
 
-    /// A message of a component has arrived from a bridge.
-    pub(crate) fn hear(
-        &mut self,
-        now: Instant,
-        bridge: BridgeId,
-        component: JausId,
-    ) -> Result<SessionId, Counter> {
-        self.enter(now, bridge, component, false)
+    /// The session of a message of a component that has arrived from a bridge.
+    pub(crate) fn hear(&self, bridge: BridgeId, component: JausId) -> Result<SessionId, Counter> {
+        match self.owners.get(&component) {
+            None => Err(Counter::NotAnnounced),
+            Some(&owner) if owner != bridge => Err(Counter::OtherBridge),
+            Some(_) => {
+                let remote = self.bridges.get(&bridge);
+                remote.map(|it| it.session).ok_or(Counter::NotAnnounced)
+            }
+        }
     }
 
     /// A bridge has declared the token of a component.
     pub(crate) fn announce(
         &mut self,
-        now: Instant,
         bridge: BridgeId,
         component: JausId,
     ) -> Result<SessionId, Counter> {
-        let entered = self.enter(now, bridge, component, true);
+        let entered = self.enter(bridge, component);
         if entered == Err(Counter::OtherBridge) {
             self.claim(bridge, component);
         }
@@ -97,38 +124,32 @@ impl Remotes {
 
     /// A bridge has declared the token of a component that belongs to this side at present.
     pub(crate) fn claim(&mut self, bridge: BridgeId, component: JausId) {
-        if self.claims.len() < MOST_CLAIMS {
-            self.claims.insert((component, bridge));
-        }
+        self.claims.insert(component, bridge);
     }
 
-    /// A component belongs to nobody any more: it goes to a bridge that has declared its token.
-    pub(crate) fn release(&mut self, now: Instant, component: JausId) {
-        let first = (component, BridgeId::new(0));
-        let claim = self.claims.range(first..).next().copied();
-        if let Some((_, bridge)) = claim.filter(|(claimed, _)| *claimed == component) {
-            self.claims.remove(&(component, bridge));
-            // There is room: the component has just left the table, or this side's.
-            let _ = self.enter(now, bridge, component, true);
-        }
+    /// A component belongs to nobody any more: it goes to a bridge that has declared its token, which is
+    /// returned.
+    pub(crate) fn release(&mut self, component: JausId) -> Option<BridgeId> {
+        let bridge = self.claims.of(component)?;
+        self.claims.remove(component, bridge);
+        self.enter(bridge, component).is_ok().then_some(bridge)
     }
 
-    fn enter(
-        &mut self,
-        now: Instant,
-        bridge: BridgeId,
-        component: JausId,
-        has_token: bool,
-    ) -> Result<SessionId, Counter> {
+    fn enter(&mut self, bridge: BridgeId, component: JausId) -> Result<SessionId, Counter> {
+        let (sessions, latest) = (&mut self.sessions, &mut self.latest);
+        let of_bridge = self
+            .bridges
+            .get(&bridge)
+            .map_or(0, |it| it.components.len());
         match self.owners.get(&component) {
             Some(&owner) if owner != bridge => return Err(Counter::OtherBridge),
             Some(_) => {}
             None if self.owners.len() >= MOST_COMPONENTS => return Err(Counter::RemoteTableFull),
+            None if of_bridge >= MOST_OF_BRIDGE => return Err(Counter::RemoteTableFull),
             None => {
                 self.owners.insert(component, bridge);
             }
         }
-        let (sessions, latest) = (&mut self.sessions, &mut self.latest);
         let found = &mut self.found;
         let remote = self.bridges.entry(bridge).or_insert_with(|| {
             *latest += 1;
@@ -138,62 +159,46 @@ impl Remotes {
             tracing::info!(%bridge, session = session.0, "bridge found");
             Remote {
                 session,
-                components: BTreeMap::new(),
-                heard: now,
+                components: BTreeSet::new(),
             }
         });
-        remote.heard = now;
-        *remote.components.entry(component).or_default() |= has_token;
+        remote.components.insert(component);
         Ok(remote.session)
     }
 
-    /// A bridge has withdrawn the token of a component, or is gone itself. Returns its session if
-    /// that was its last token.
-    pub(crate) fn withdraw(
-        &mut self,
-        now: Instant,
-        bridge: BridgeId,
-        component: JausId,
-    ) -> Option<SessionId> {
-        self.claims.remove(&(component, bridge));
-        let remote = self.bridges.get_mut(&bridge)?;
-        remote.components.remove(&component)?;
-        let is_last = !remote.has_tokens();
-        self.owners.remove(&component);
-        let closed = is_last.then(|| self.remove(now, bridge)).flatten();
-        self.release(now, component);
-        closed
-    }
-
-    /// Forgets the bridges without a token that have been silent; returns their sessions.
-    pub(crate) fn expire(&mut self, now: Instant) -> Vec<SessionId> {
-        let is_over = |remote: &Remote| {
-            !remote.has_tokens() && now.saturating_duration_since(remote.heard) >= WITHOUT_TOKENS
+    /// A bridge has withdrawn the token of a component, or is gone itself.
+    pub(crate) fn withdraw(&mut self, bridge: BridgeId, component: JausId) -> Withdrawn {
+        self.claims.remove(component, bridge);
+        let mut withdrawn = Withdrawn::default();
+        let Some(remote) = self.bridges.get_mut(&bridge) else {
+            return withdrawn;
         };
-        let gone = self.bridges.iter().filter(|(_, remote)| is_over(remote));
-        let gone: Vec<_> = gone.map(|(&bridge, _)| bridge).collect();
-        gone.into_iter()
-            .filter_map(|bridge| self.remove(now, bridge))
-            .collect()
-    }
-
-    fn remove(&mut self, now: Instant, bridge: BridgeId) -> Option<SessionId> {
-        let remote = self.bridges.remove(&bridge)?;
-        self.sessions.remove(&remote.session);
-        tracing::info!(%bridge, session = remote.session.0, "bridge gone");
-        for component in remote.components.into_keys() {
-            self.owners.remove(&component);
-            self.release(now, component);
+        if !remote.components.remove(&component) {
+            return withdrawn;
         }
-        Some(remote.session)
+        if remote.components.is_empty() {
+            let session = remote.session;
+            self.bridges.remove(&bridge);
+            self.sessions.remove(&session);
+            tracing::info!(%bridge, session = session.0, "bridge gone");
+            withdrawn.closed = Some(session);
+        }
+        self.owners.remove(&component);
+        withdrawn.next = self.release(component);
+        withdrawn
     }
 }
 
+/// What the withdrawal of a token changes.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Withdrawn {
+    /// The session that ends, if that was the last token of its bridge.
+    pub(crate) closed: Option<SessionId>,
+    /// The bridge to which the component belongs now.
+    pub(crate) next: Option<BridgeId>,
+}
+
 #[cfg(test)]
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the tests start at an arbitrary instant"
-)]
 mod tests {
     use super::*;
 
@@ -204,68 +209,84 @@ mod tests {
 
     #[test]
     fn a_component_belongs_to_one_bridge_until_that_withdraws_it() {
-        let (now, mut remotes) = (Instant::now(), Remotes::default());
-        let session = remotes.announce(now, ONE, ROVER).unwrap();
-        assert_eq!(remotes.hear(now, ONE, SENSOR), Ok(session));
+        let mut remotes = Remotes::default();
+        let session = remotes.announce(ONE, ROVER).unwrap();
+        assert_eq!(remotes.hear(ONE, ROVER), Ok(session));
         assert_eq!(remotes.bridge(session), Some(ONE));
-        for component in [ROVER, SENSOR] {
-            let refused = Err(Counter::OtherBridge);
-            assert_eq!(remotes.hear(now, TWO, component), refused);
-            assert_eq!(remotes.announce(now, TWO, component), refused);
-        }
-        assert_eq!(remotes.withdraw(now, ONE, ROVER), Some(session));
-        let next = remotes.hear(now, TWO, ROVER).unwrap();
+        assert_eq!(remotes.hear(TWO, ROVER), Err(Counter::OtherBridge));
+        assert_eq!(remotes.announce(TWO, ROVER), Err(Counter::OtherBridge));
+        let withdrawn = remotes.withdraw(ONE, ROVER);
+        assert_eq!(withdrawn.closed, Some(session));
+        assert_eq!(withdrawn.next, Some(TWO), "its token was there");
+        let next = remotes.hear(TWO, ROVER).unwrap();
         assert_ne!(next, session, "a number is not used twice");
-        assert_eq!(remotes.hear(now, TWO, SENSOR), Ok(next));
+    }
+
+    #[test]
+    fn a_message_without_a_token_counts_for_nothing() {
+        let mut remotes = Remotes::default();
+        assert_eq!(remotes.hear(ONE, ROVER), Err(Counter::NotAnnounced));
+        remotes.announce(ONE, SENSOR).unwrap();
+        assert_eq!(remotes.hear(ONE, ROVER), Err(Counter::NotAnnounced));
+        assert!(!remotes.contains(ROVER));
+        assert!(remotes.announce(TWO, ROVER).is_ok());
     }
 
     #[test]
     fn a_session_ends_with_the_last_token() {
-        let (now, mut remotes) = (Instant::now(), Remotes::default());
-        let session = remotes.announce(now, ONE, ROVER).unwrap();
-        remotes.announce(now, ONE, SENSOR).unwrap();
-        assert_eq!(remotes.withdraw(now, ONE, ROVER), None);
-        assert_eq!(remotes.withdraw(now, ONE, ROVER), None, "once more");
-        assert_eq!(remotes.withdraw(now, TWO, SENSOR), None, "not its own");
-        assert_eq!(remotes.withdraw(now, ONE, SENSOR), Some(session));
+        let mut remotes = Remotes::default();
+        let session = remotes.announce(ONE, ROVER).unwrap();
+        remotes.announce(ONE, SENSOR).unwrap();
+        let nothing = Withdrawn::default();
+        assert_eq!(remotes.withdraw(ONE, ROVER), nothing);
+        assert_eq!(remotes.withdraw(ONE, ROVER), nothing, "once more");
+        assert_eq!(remotes.withdraw(TWO, SENSOR), nothing, "not its own");
+        assert_eq!(remotes.withdraw(ONE, SENSOR).closed, Some(session));
         assert_eq!(remotes.bridge(session), None);
     }
 
     #[test]
-    fn the_token_of_a_restarted_bridge_counts_when_the_old_one_is_gone() {
-        let (now, mut remotes) = (Instant::now(), Remotes::default());
-        let before = remotes.announce(now, ONE, ROVER).unwrap();
-        let refused = remotes.announce(now, TWO, ROVER);
-        assert_eq!(refused, Err(Counter::OtherBridge));
-        assert_eq!(remotes.withdraw(now, ONE, ROVER), Some(before));
-        assert!(remotes.contains(ROVER));
-        let session = remotes.hear(now, TWO, ROVER).unwrap();
-        // It has a token, so silence does not end it.
-        assert!(remotes.expire(now + 2 * WITHOUT_TOKENS).is_empty());
-        assert_eq!(remotes.withdraw(now, TWO, ROVER), Some(session));
+    fn a_withdrawn_claim_gains_nothing() {
+        let mut remotes = Remotes::default();
+        remotes.announce(ONE, ROVER).unwrap();
+        remotes.announce(TWO, ROVER).unwrap_err();
+        remotes.withdraw(TWO, ROVER);
+        assert_eq!(remotes.withdraw(ONE, ROVER).next, None);
         assert!(!remotes.contains(ROVER));
+        assert_eq!(remotes.claims.of_bridge, BTreeMap::new());
+    }
+
+    fn component(number: usize) -> JausId {
+        let number = u16::try_from(number).unwrap();
+        JausId::new(1 + number / 200, 1, 1 + (number % 200) as u8)
     }
 
     #[test]
-    fn a_bridge_without_tokens_is_forgotten_when_it_is_silent() {
-        let (start, mut remotes) = (Instant::now(), Remotes::default());
-        let silent = remotes.hear(start, ONE, ROVER).unwrap();
-        remotes.announce(start, TWO, SENSOR).unwrap();
-        assert!(remotes.expire(start + WITHOUT_TOKENS / 2).is_empty());
-        let later = start + 100 * WITHOUT_TOKENS;
-        assert_eq!(remotes.expire(later), [silent]);
-        assert!(remotes.contains(SENSOR), "it has a token");
-    }
-
-    #[test]
-    fn the_table_of_components_has_a_bound() {
-        let (now, mut remotes) = (Instant::now(), Remotes::default());
-        for number in 0..MOST_COMPONENTS {
-            let number = u16::try_from(number).unwrap();
-            let component = JausId::new(1 + number / 200, 1, 1 + (number % 200) as u8);
-            remotes.announce(now, ONE, component).unwrap();
+    fn a_bridge_has_its_share_of_the_components_and_leaves_the_rest_to_others() {
+        let mut remotes = Remotes::default();
+        for number in 0..MOST_OF_BRIDGE {
+            remotes.announce(ONE, component(number)).unwrap();
         }
-        let refused = remotes.announce(now, ONE, JausId::new(60_000, 1, 1));
-        assert_eq!(refused, Err(Counter::RemoteTableFull));
+        let full = Err(Counter::RemoteTableFull);
+        assert_eq!(remotes.announce(ONE, component(MOST_OF_BRIDGE)), full);
+        for number in MOST_OF_BRIDGE..MOST_COMPONENTS {
+            let bridge = BridgeId::new((number / MOST_OF_BRIDGE) as u64 + 1);
+            remotes.announce(bridge, component(number)).unwrap();
+        }
+        let bridge = BridgeId::new(9);
+        assert_eq!(remotes.announce(bridge, component(MOST_COMPONENTS)), full);
+    }
+
+    #[test]
+    fn a_bridge_has_its_share_of_the_claims_and_leaves_the_rest_to_others() {
+        let mut remotes = Remotes::default();
+        for number in 0..=MOST_OF_BRIDGE {
+            remotes.claim(ONE, component(number));
+        }
+        let last = component(MOST_OF_BRIDGE);
+        assert_eq!(remotes.release(last), None, "one too many");
+        remotes.claim(TWO, last);
+        assert_eq!(remotes.release(last), Some(TWO));
+        assert_eq!(remotes.release(component(0)), Some(ONE));
     }
 }

@@ -4,8 +4,9 @@
 use roxmltree::Document;
 
 use super::lexer::{Fault, Kind, Remark, Token, tokens, unquoted};
-use super::tree::{Element, REFERENCE, Text};
+use super::tree::{Element, REFERENCE, Text, name_of};
 use super::words;
+use crate::syntax::EXTENSION;
 
 pub(super) type Read<T> = Result<T, Fault>;
 
@@ -467,7 +468,7 @@ impl<'t> Cursor<'t> {
         let mut comments = self.rest();
         let (written, at) = self.take();
         let inner = &written[3..written.len() - 2];
-        let before = "<references xmlns=\"urn:jaus:jsidl:1.1\">";
+        let before = format!("<references xmlns=\"urn:jaus:jsidl:1.1\" xmlns:own=\"{EXTENSION}\">");
         let document = format!("{before}{inner}</references>");
         let position =
             |found: usize| (at + 3 + found.saturating_sub(before.len())).min(at + written.len());
@@ -523,7 +524,7 @@ fn amend(element: &mut Element, amendment: &str, at: usize) -> Read<()> {
         true => (None, amendment),
         false => (Some(first), rest),
     };
-    let document = format!("<x {pairs}/>");
+    let document = format!("<x xmlns:own=\"{EXTENSION}\" {pairs}/>");
     if crate::syntax::excess(&document).is_some() {
         return fault("this changes too many attributes".to_owned());
     }
@@ -546,10 +547,13 @@ fn amend(element: &mut Element, amendment: &str, at: usize) -> Read<()> {
         },
     };
     for pair in document.root_element().attributes() {
+        let Some(name) = name_of(&pair) else {
+            continue;
+        };
         if pair.value().is_empty() {
-            target.attributes.retain(|it| it.name != pair.name());
+            target.attributes.retain(|it| it.name != name);
         } else {
-            target.set(pair.name(), pair.value(), at);
+            target.set(&name, pair.value(), at);
         }
     }
     if let Some(uri) = document.root_element().tag_name().namespace() {

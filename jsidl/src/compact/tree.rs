@@ -4,9 +4,13 @@ use roxmltree::{Document, Node as Xml, ParsingOptions};
 
 use crate::grammar::{self, Edition};
 use crate::source::Translation;
+use crate::syntax::EXTENSION;
 
 /// Name of a reference in the compact form, which does not say what it refers to.
 pub(super) const REFERENCE: &str = "declared_";
+
+/// Prefix of attributes of our own namespace, in both forms.
+pub(super) const OWN: &str = "own:";
 
 /// A part of a drawing in the namespace of the language.
 const START_ARROW: &str = "pseudo_start_state";
@@ -180,14 +184,27 @@ impl Element {
         writer
             .text
             .push_str("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-        writer.element(self, !self.attributes.iter().any(|it| it.name == "xmlns"));
+        let mut root = self.clone();
+        if !root.attributes.iter().any(|it| it.name == "xmlns") {
+            root.set("xmlns", Edition::V1_1.namespace(), root.at);
+        }
+        if root.has_own() {
+            root.set("xmlns:own", EXTENSION, root.at);
+        }
+        writer.element(&root);
         writer.translation()
+    }
+
+    /// Whether it, or an element in it, has an attribute of our own namespace.
+    fn has_own(&self) -> bool {
+        let is_own = |it: &Attribute| it.name.starts_with(OWN);
+        self.attributes.iter().any(is_own) || self.children.iter().any(Self::has_own)
     }
 
     /// Its XML as a part of a document.
     pub(super) fn to_part(&self) -> String {
         let mut writer = Writer::default();
-        writer.element(self, false);
+        writer.element(self);
         // It is written into a comment of the compact form.
         writer.text.replace("*/", "&#42;/")
     }
@@ -206,13 +223,16 @@ fn of_xml(xml: Xml<'_, '_>, depth: usize) -> Result<Element, (usize, String)> {
         ));
     }
     let mut element = Element::new(known.name, at);
-    for given in xml.attributes().filter(|it| it.namespace().is_none()) {
+    for given in xml.attributes() {
+        let Some(name) = name_of(&given) else {
+            continue;
+        };
         let value = given
             .value()
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        element.set(given.name(), value, given.range_value().start);
+        element.set(&name, value, given.range_value().start);
     }
     if known.text {
         let texts = xml.children().filter(Xml::is_text);
@@ -236,6 +256,15 @@ fn of_xml(xml: Xml<'_, '_>, depth: usize) -> Result<Element, (usize, String)> {
     }
     element.trailing = comments;
     Ok(element)
+}
+
+/// The name of an attribute of the language or of our own namespace.
+pub(super) fn name_of(attribute: &roxmltree::Attribute<'_, '_>) -> Option<String> {
+    match attribute.namespace() {
+        None => Some(attribute.name().to_owned()),
+        Some(EXTENSION) => Some(format!("{OWN}{}", attribute.name())),
+        Some(_) => None,
+    }
 }
 
 #[derive(Default)]
@@ -263,7 +292,7 @@ impl Writer {
         }
     }
 
-    fn element(&mut self, element: &Element, with_namespace: bool) {
+    fn element(&mut self, element: &Element) {
         self.comments(&element.comments);
         self.mark(element.at);
         self.text.push('<');
@@ -276,11 +305,6 @@ impl Writer {
             escape(&mut self.text, &attribute.value, true);
             self.text.push('"');
         }
-        if with_namespace {
-            self.text.push_str(" xmlns=\"");
-            self.text.push_str(Edition::V1_1.namespace());
-            self.text.push('"');
-        }
         if let Some(text) = &element.text {
             self.text.push('>');
             self.mark(text.at);
@@ -291,7 +315,7 @@ impl Writer {
         } else {
             self.text.push_str(">\n");
             for child in &element.children {
-                self.element(child, false);
+                self.element(child);
             }
             self.comments(&element.trailing);
         }

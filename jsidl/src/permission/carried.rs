@@ -5,6 +5,7 @@
 //! | `7` | as many octets |
 //! | `b2` | a count of 2 octets, and so many octets |
 //! | `m4` | a count of 4 octets, and a message of that length |
+//! | `d` | 4 octets: the component to which the messages behind it in the same element are sent |
 //! | `f2:0,3` | a format, a count of 2 octets, and so many octets: a message in the formats 0 and 3 |
 //! | `*1(…)` | a count of 1 octet, and so many elements |
 //! | `?1(…;~…)` | a presence vector of 1 octet, and members; those with `~` are optional |
@@ -21,7 +22,10 @@ pub(super) fn layout(message: &Message) -> Option<String> {
     if !parts.iter().any(|it| carries(&it.shape)) {
         return None;
     }
-    let mut notation = Notation::default();
+    let mut notation = Notation {
+        destination: message.destination.as_deref(),
+        ..Notation::default()
+    };
     for part in parts {
         notation.shape(&part.shape);
     }
@@ -39,16 +43,34 @@ fn carries(shape: &Shape) -> bool {
     }
 }
 
+/// Octets of a component's id.
+const ID: usize = 4;
+
+/// Whether all messages that it carries have their destinations before them, as far as one can tell.
+pub(super) fn has_destinations(message: &Message) -> bool {
+    let layout = layout(message).unwrap_or_default();
+    // Each list and each part in parentheses is looked at by itself.
+    let elements = layout.split(['(', ')', ';']);
+    let mut carriers = elements.filter(|it| it.contains(['m', 'f'])).peekable();
+    let is_behind = |it: &str| {
+        it.find('d')
+            .is_some_and(|at| it.find(['m', 'f']) > Some(at))
+    };
+    carriers.peek().is_some() && carriers.all(is_behind)
+}
+
 #[derive(Default)]
-struct Notation {
+struct Notation<'m> {
+    /// The field with the destination.
+    destination: Option<&'m str>,
     text: String,
     /// Octets of fixed fields that are not written yet.
     fixed: usize,
 }
 
-impl Notation {
+impl Notation<'_> {
     fn shape(&mut self, shape: &Shape) {
-        if let Some(size) = fixed_size(shape) {
+        if let Some(size) = fixed_size(shape).filter(|_| !self.has_destination(shape)) {
             self.fixed += size;
             return;
         }
@@ -83,12 +105,28 @@ impl Notation {
     fn group(&mut self, group: &Group) {
         let Some(presence) = group.presence else {
             for member in &group.members {
-                self.shape(&member.shape);
+                self.member(member);
             }
             return;
         };
         self.push(&format!("?{}", presence.size()));
         self.enclosed(&group.members, |it| if it.optional { "~" } else { "" });
+    }
+
+    /// Whether the destination is in it.
+    fn has_destination(&self, shape: &Shape) -> bool {
+        let is_or_has =
+            |it: &Item| self.destination == Some(&it.name) || self.has_destination(&it.shape);
+        self.destination.is_some() && shape.items().any(is_or_has)
+    }
+
+    /// A member of a group, or what a list or variant has.
+    fn member(&mut self, item: &Item) {
+        if self.destination == Some(&item.name) && fixed_size(&item.shape) == Some(ID) {
+            self.push("d");
+        } else {
+            self.shape(&item.shape);
+        }
     }
 
     fn enclosed<'i>(
@@ -97,8 +135,15 @@ impl Notation {
         mark: impl Fn(&Item) -> &'static str,
     ) {
         let inner = items.into_iter().map(|item| {
-            let mut inner = Self::default();
-            inner.shape(&item.shape);
+            let mut inner = Self {
+                destination: self.destination,
+                ..Self::default()
+            };
+            if item.optional {
+                inner.shape(&item.shape);
+            } else {
+                inner.member(item);
+            }
             format!("{}{}", mark(item), inner.finish())
         });
         let inner: Vec<_> = inner.collect();

@@ -18,15 +18,21 @@
 //! | `emergency` | stops |
 //! | `clear-emergency` | ends a stop |
 //! | `command` | changes or moves something |
+//! | `carry` | commands by the message that it carries, and does nothing else |
 //! | `control` | asks for control; `authority` names the field with the authority that it asks for |
-//! | `configure` | shuts a component down, or changes its set-up |
+//! | `configure` | shuts a component down, resets it, or sets its time |
 //!
-//! A message that a service receives needs the attribute, unless it is marked as a query: no command,
-//! and answered by a report of the same service. What a service only sends is a report, unless it is a
-//! command. Nothing is guessed: the message has no permission otherwise, and a node refuses it.
+//! A message that a service receives needs the attribute, unless the state machine of the service marks it
+//! as a query: all that it triggers is that an output of the service is sent. What a service only sends is a
+//! report, unless it is a command. Nothing is guessed, and no name decides: the message has no permission
+//! otherwise, and a node refuses it.
 //!
-//! Where several services give one code to different messages, the greatest right is needed: a node
+//! Where several services give one code to different messages, the rights to all of them are needed: a node
 //! cannot tell which of them is meant.
+//!
+//! If the receiver of a message sends those that it carries on to other components, as a mission spooler does,
+//! the attribute `destination` names the field with the id of the component: 4 octets, before the message in
+//! the same element.
 
 mod carried;
 
@@ -34,10 +40,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
+use crate::behaviour::{StateMachine, Transition, TransitionKind};
 use crate::library::Library;
 use crate::model::{GroupKind, Item, Message, Number, Service, Shape, Unsigned};
 
-/// What the sender of a message must be allowed to do; the greater of two rights comes later.
+/// What the sender of a message must be allowed to do.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Permission {
@@ -54,9 +61,11 @@ pub enum Permission {
     Emergency,
     /// To command.
     Command,
+    /// To command by what the message carries.
+    Carry,
     /// To clear an emergency.
     ClearEmergency,
-    /// To shut down and to set up.
+    /// To shut down, to reset, and to set the time.
     Configure,
     /// To take control.
     Control {
@@ -67,7 +76,7 @@ pub enum Permission {
 
 impl Permission {
     /// The words of the attribute; their fields have attributes of their own.
-    pub(crate) const WORDS: [(&str, Self); 8] = [
+    pub(crate) const WORDS: [(&str, Self); 9] = [
         ("observe", Self::Observe),
         (
             "answer",
@@ -78,6 +87,7 @@ impl Permission {
         ("release", Self::Release),
         ("emergency", Self::Emergency),
         ("command", Self::Command),
+        ("carry", Self::Carry),
         ("clear-emergency", Self::ClearEmergency),
         ("configure", Self::Configure),
         ("control", Self::Control { authority: None }),
@@ -115,11 +125,10 @@ pub struct Permissions {
 }
 
 /// What is known of a message code.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Row {
-    needs: Permission,
-    /// The place of its field, in octets from the beginning of the message.
-    place: Option<usize>,
+    /// The rights, with the places of their fields, in octets from the beginning of the message.
+    needs: BTreeSet<(Permission, Option<usize>)>,
     names: BTreeSet<String>,
     /// The layouts of messages with this code that carry others.
     carries: BTreeSet<String>,
@@ -135,28 +144,29 @@ impl Permissions {
             let received = found.services.entry(service.id.urn.clone()).or_default();
             received.extend(service.inputs.iter().map(|it| it.code));
             for message in &service.inputs {
-                let needs = stated
-                    .get(&key(message))
-                    .cloned()
-                    .or_else(|| is_query(service, message).then_some(Permission::Observe));
-                match needs {
-                    Some(needs) => found.add(message, needs, true),
-                    None if missing.insert(key(message)) => found.missing.push(message.clone()),
-                    None => {}
+                let needs = match stated.get(&key(message)) {
+                    Some(stated) => stated.clone(),
+                    None if is_query(service, message) => vec![Permission::Observe],
+                    None => Vec::new(),
+                };
+                if needs.is_empty() && missing.insert(key(message)) {
+                    found.missing.push(message.clone());
                 }
+                found.add(message, needs, true);
             }
         }
         for message in library.services().flat_map(|service| &service.outputs) {
             // A client sends commands, too: those that a service receives are judged there.
             let is_report = !message.is_command && !missing.contains(&key(message));
-            let needs = stated.get(&key(message)).cloned();
-            let needs = needs.or_else(|| is_report.then_some(Permission::Observe));
-            if needs.is_none() && missing.insert(key(message)) {
+            let needs = match stated.get(&key(message)) {
+                Some(stated) => stated.clone(),
+                None if is_report => vec![Permission::Observe],
+                None => Vec::new(),
+            };
+            if needs.is_empty() && missing.insert(key(message)) {
                 found.missing.push(message.clone());
             }
-            if let Some(needs) = needs {
-                found.add(message, needs, false);
-            }
+            found.add(message, needs, false);
         }
         found
             .rows
@@ -164,20 +174,18 @@ impl Permissions {
         found
     }
 
-    fn add(&mut self, message: &Message, needs: Permission, is_received: bool) {
-        let place = needs.field().and_then(|field| place_of(message, field));
-        let carries = is_received.then(|| carried::layout(message)).flatten();
-        let row = self.rows.entry(message.code).or_insert_with(|| Row {
-            needs: Permission::Observe,
-            place: None,
-            names: BTreeSet::new(),
-            carries: BTreeSet::new(),
-        });
-        if needs > row.needs {
-            (row.needs, row.place) = (needs, place);
+    fn add(&mut self, message: &Message, needs: Vec<Permission>, is_received: bool) {
+        if needs.is_empty() {
+            return;
         }
+        let row = self.rows.entry(message.code).or_default();
+        row.needs.extend(needs.into_iter().map(|needs| {
+            let place = needs.field().and_then(|field| place_of(message, field));
+            (needs, place)
+        }));
         row.names.insert(message.name.clone());
-        row.carries.extend(carries);
+        row.carries
+            .extend(is_received.then(|| carried::layout(message)).flatten());
     }
 }
 
@@ -186,19 +194,22 @@ impl Permissions {
 /// ```text
 /// 000D control@2 RequestControl
 /// 01F0 observe CreateEvent [4m4]
+/// F92A command,observe CBRNScanWindowConfigurationCommand,QueryMeasurement
 /// service urn:jaus:jss:core:Time 0011 2011
 /// ```
 ///
-/// The code in hexadecimal digits; the right, with the place of the field that belongs to it; the names,
-/// separated by commas; and for a message that carries others, the layouts that it may have. A service
+/// The code in hexadecimal digits; the rights, separated by commas, each with the place of the field that
+/// belongs to it; the names, separated by commas; and for a message that carries others, the layouts that it may have. A service
 /// has the codes that it receives.
 impl fmt::Display for Permissions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (code, row) in &self.rows {
-            let mut line = format!("{code:04X} {}", row.needs);
-            if let Some(place) = row.place {
-                write!(line, "@{place}")?;
-            }
+            let words = row.needs.iter().map(|(needs, place)| match place {
+                Some(place) => format!("{needs}@{place}"),
+                None => needs.to_string(),
+            });
+            let needs: Vec<_> = words.collect::<BTreeSet<_>>().into_iter().collect();
+            let mut line = format!("{code:04X} {}", needs.join(","));
             let names: Vec<_> = row.names.iter().map(String::as_str).collect();
             write!(line, " {}", names.join(","))?;
             for layout in &row.carries {
@@ -219,25 +230,44 @@ fn key(message: &Message) -> (u16, String) {
     (message.code, message.name.clone())
 }
 
-/// What the definitions state; of several statements the greatest right counts.
-fn stated(library: &Library) -> BTreeMap<(u16, String), Permission> {
-    let mut stated = BTreeMap::new();
+/// What the definitions state: of several statements all count.
+fn stated(library: &Library) -> BTreeMap<(u16, String), Vec<Permission>> {
+    let mut stated: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for message in library.services().flat_map(|it| it.messages()) {
         if let Some(needs) = &message.permission {
-            let known = stated.entry(key(message)).or_insert_with(|| needs.clone());
-            if needs > known {
-                known.clone_from(needs);
+            let known = stated.entry(key(message)).or_default();
+            if !known.contains(needs) {
+                known.push(needs.clone());
             }
         }
     }
     stated
 }
 
-/// Whether a service answers this message by a report: then it changes nothing.
+/// Whether the state machines of a service mark this message as a query: wherever it triggers something, that
+/// is that reports are sent, and no state changes.
 fn is_query(service: &Service, message: &Message) -> bool {
-    let subject = message.name.strip_prefix("Query");
-    let answers = |report: &Message| report.name.strip_prefix("Report") == subject;
-    !message.is_command && subject.is_some() && service.outputs.iter().any(|it| answers(it))
+    let is_report = |name: &str| {
+        let output = service.outputs.iter().find(|it| it.name == name);
+        let is_input = service.inputs.iter().any(|it| it.name == name);
+        !is_input && output.is_some_and(|it| !it.is_command)
+    };
+    let only_answers = |transition: &Transition| {
+        let mut actions = transition.actions.iter();
+        transition.kind == TransitionKind::Internal
+            && !transition.actions.is_empty()
+            && actions.all(|it| it.sent().is_some_and(is_report))
+    };
+    let transitions = service.behaviour.iter().flat_map(StateMachine::transitions);
+    let mut triggered = transitions
+        .filter(|it| it.trigger.message() == Some(&message.name))
+        .peekable();
+    !message.is_command && triggered.peek().is_some() && triggered.all(only_answers)
+}
+
+/// Whether a node finds the destinations of the messages that this message carries.
+pub(crate) fn has_destinations(message: &Message) -> bool {
+    carried::has_destinations(message)
 }
 
 /// The place of a field of one octet, which stands after fields of fixed sizes at the head of the body,

@@ -8,7 +8,7 @@ use super::{Resolved, Resolver, Whole};
 use crate::check;
 use crate::model::{Item, Message};
 use crate::permission::{self, Permission};
-use crate::source::Span;
+use crate::source::{Span, Spanned};
 use crate::syntax::{Content, Declaration, EventDef, MessageDef, Section, TypeSetIndex};
 
 impl Resolver<'_> {
@@ -17,8 +17,9 @@ impl Resolver<'_> {
         &mut self,
         scope: TypeSetIndex,
         declaration: &Declaration,
-        message: &MessageDef,
+        definition: &MessageDef,
     ) -> Option<Arc<Message>> {
+        let message = definition;
         let header = self.section(scope, &message.header);
         let body = self.section(scope, &message.body);
         let footer = self.section(scope, &message.footer);
@@ -29,14 +30,15 @@ impl Resolver<'_> {
             is_command: message.is_command,
             is_deprecated: message.is_deprecated,
             permission: message.permission.clone(),
+            destination: message.destination.as_ref().map(|it| it.value.clone()),
             description: message.description.clone(),
             header,
             body: self.taken(body?, &message.body)?,
             footer: self.taken(footer?, &message.footer)?,
             location: self.location(declaration.span),
         });
-        self.field_of_permission(declaration.span, &message)
-            .then_some(message)
+        let is_found = self.field_of_permission(declaration.span, &message);
+        (is_found && self.destination(&definition.destination, &message)).then_some(message)
     }
 
     /// Checks that a node finds the field that belongs to the permission of a message.
@@ -51,6 +53,23 @@ impl Resolver<'_> {
                  without optional fields, with nothing of variable length before it"
             );
             self.report.error(span, text);
+        }
+        is_found
+    }
+
+    /// Checks that a node finds the destinations of the messages that a message carries.
+    fn destination(&mut self, field: &Option<Spanned<String>>, message: &Message) -> bool {
+        let Some(field) = field.as_ref() else {
+            return true;
+        };
+        let is_found = permission::has_destinations(message);
+        if !is_found {
+            let text = format!(
+                "a node cannot find the field `{}`: name a field of 4 octets that is not optional, in the \
+                 same record or sequence as the carried message and before it",
+                field.value
+            );
+            self.report.error(field.span, text);
         }
         is_found
     }

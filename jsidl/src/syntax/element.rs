@@ -17,7 +17,7 @@ use crate::spelling::shortened;
 const PLUS: &str = "urn:jaus:jsidl:plus";
 
 /// Namespace of our attributes beyond JSIDL.
-pub(super) const EXTENSION: &str = "urn:jaus-rs:jsidl";
+pub(crate) const EXTENSION: &str = "urn:jaus-rs:jsidl";
 
 /// Maximum length of names and URNs: findings repeat them.
 const LONGEST_NAME: usize = 200;

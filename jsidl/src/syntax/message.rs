@@ -67,6 +67,7 @@ impl Reader<'_> {
             is_command: is_command.ok()?.unwrap_or(false),
             is_deprecated: is_deprecated.ok()?.unwrap_or(false),
             permission: permission.ok()?,
+            destination: self.attribute(xml, (EXTENSION, "destination")),
             description: description
                 .map(|it| self.description(it))
                 .unwrap_or_default(),

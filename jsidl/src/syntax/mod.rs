@@ -21,6 +21,7 @@ use crate::model::{GroupKind, Id, Number, Rounding, Unsigned, Version};
 use crate::permission::Permission;
 use crate::source::{Span, Spanned};
 
+pub(crate) use element::EXTENSION;
 pub(crate) use limits::{LARGEST, excess};
 pub(crate) use root::{Strictness, check_strictly, is_definition, read};
 
@@ -235,6 +236,7 @@ pub(crate) struct MessageDef {
     pub(crate) is_command: bool,
     pub(crate) is_deprecated: bool,
     pub(crate) permission: Option<Permission>,
+    pub(crate) destination: Option<Spanned<String>>,
     pub(crate) description: String,
     pub(crate) header: Section,
     pub(crate) body: Section,

@@ -1,5 +1,7 @@
 //! What the senders of messages need, as definitions state it.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use jsidl::Loader;
 use jsidl::permission::Permissions;
 
@@ -29,8 +31,12 @@ optional="false" field_type="unsigned short integer" field_units="one"/></record
 
 /// The table and the names of messages without permission; or the first mistake.
 fn permissions(inputs: &[String], outputs: &[String]) -> Result<(String, Vec<String>), String> {
+    permissions_of(&service(&inputs.concat(), &outputs.concat()))
+}
+
+fn permissions_of(text: &str) -> Result<(String, Vec<String>), String> {
     let mut loader = Loader::new();
-    loader.text("lamp.xml", &service(&inputs.concat(), &outputs.concat()));
+    loader.text("lamp.xml", text);
     let loaded = loader.load();
     if let Some(error) = loaded.diagnostics.errors().next() {
         return Err(error.message.clone());
@@ -45,26 +51,76 @@ const OCTETS: &str = r#"<record name="Rec" optional="false">
 <fixed_field name="Rank" optional="false" field_type="unsigned byte" field_units="one"/></record>"#;
 
 #[test]
-fn a_query_and_a_report_need_nothing_and_every_other_input_says_what_it_needs() {
+fn a_query_by_the_state_machine_needs_nothing_and_every_other_input_says_what_it_needs() {
     let inputs = [
-        message("QueryLamp", "E000", "", ""),
         message("SetLamp", "D000", r#"own:permission="command""#, ""),
         message("DimLamp", "D001", "", ""),
-        // No report of the service answers it, or it is a command.
-        message("QueryBulb", "E001", "", ""),
-        message("QueryWatt", "E002", r#"is_command="true""#, ""),
+        // No name makes a query.
+        message("QueryLamp", "E000", "", ""),
+        message("AskLamp", "E001", "", ""),
+        message("AskAndDim", "E002", "", ""),
+        message("AskAndGo", "E003", "", ""),
+        message("AskWatt", "E004", r#"is_command="true""#, ""),
+        message("AskLimit", "E005", r#"own:permission="observe""#, ""),
     ];
     let outputs = [
         message("ReportLamp", "F000", "", ""),
-        message("ReportWatt", "F002", "", ""),
+        message("Brightness", "F001", "", ""),
     ];
-    let (table, missing) = permissions(&inputs, &outputs).unwrap();
+    let answer = |asked: &str, kind: &str, actions: &str| {
+        format!(
+            r#"<transition name="Receive"><parameter type="{asked}" value="msg"/>{kind}
+{actions}</transition>"#
+        )
+    };
+    let send = |name: &str| format!(r#"<action name="Send"><argument value="'{name}'"/></action>"#);
+    let dim = r#"<action name="dim"/>"#;
+    let internal = "<internal/>";
+    let again = r#"<simple><end_state state="S"/></simple>"#;
+    let machine = [
+        answer("AskLamp", internal, &send("Brightness")),
+        answer("AskAndDim", internal, &[&send("Brightness"), dim].concat()),
+        answer("AskAndGo", again, &send("Brightness")),
+        answer("AskWatt", internal, &send("Brightness")),
+    ];
+    let text = service(&inputs.concat(), &outputs.concat());
+    let text = text.replace(
+        r#"<state name="S"/>"#,
+        &format!(r#"<state name="S">{}</state>"#, machine.concat()),
+    );
+    let (table, missing) = permissions_of(&text).unwrap();
+    assert_eq!(
+        missing,
+        ["DimLamp", "QueryLamp", "AskAndDim", "AskAndGo", "AskWatt"]
+    );
     assert_eq!(
         table,
-        "D000 command SetLamp\nE000 observe QueryLamp\nF000 observe ReportLamp\n\
-         F002 observe ReportWatt\nservice urn:example:Lamp D000 D001 E000 E001 E002\n"
+        "D000 command SetLamp\nE001 observe AskLamp\nE005 observe AskLimit\n\
+         F000 observe ReportLamp\nF001 observe Brightness\n\
+         service urn:example:Lamp D000 D001 E000 E001 E002 E003 E004 E005\n"
     );
-    assert_eq!(missing, ["DimLamp", "QueryBulb", "QueryWatt"]);
+}
+
+#[test]
+fn the_destination_of_carried_messages_is_named_and_found() {
+    let carried = r#"<record name="Rec" optional="false">
+<fixed_field name="To" optional="false" field_type="unsigned integer" field_units="one"/>
+<fixed_field name="Kind" optional="false" field_type="unsigned byte" field_units="one"/>
+<variable_length_field name="Order" optional="false" field_format="JAUS MESSAGE"><count_field
+field_type_unsigned="unsigned byte"/></variable_length_field></record>"#;
+    let send = |destination: &str| {
+        let attributes = format!(r#"own:permission="command" own:destination="{destination}""#);
+        permissions(&[message("PassOn", "D003", &attributes, carried)], &[])
+    };
+    let (table, _) = send("To").unwrap();
+    assert!(table.starts_with("D003 command PassOn [d1m1]\n"), "{table}");
+    for wrong in ["Kind", "Nobody"] {
+        let error = send(wrong).unwrap_err();
+        assert!(
+            error.contains(&format!("cannot find the field `{wrong}`")),
+            "{error}"
+        );
+    }
 }
 
 #[test]
@@ -81,9 +137,10 @@ fn a_message_that_a_client_sends_is_no_report() {
 }
 
 #[test]
-fn of_one_code_the_greater_right_counts() {
+fn of_one_code_the_rights_to_all_messages_are_needed() {
     let inputs = [
-        message("QueryLamp", "E000", "", ""),
+        message("QueryLamp", "E000", r#"own:permission="observe""#, ""),
+        message("WarmLamp", "E000", r#"own:permission="configure""#, ""),
         message(
             "TakeLamp",
             "E000",
@@ -91,9 +148,9 @@ fn of_one_code_the_greater_right_counts() {
             OCTETS,
         ),
     ];
-    let (table, _) = permissions(&inputs, &[message("ReportLamp", "F000", "", "")]).unwrap();
+    let (table, _) = permissions(&inputs, &[]).unwrap();
     assert!(
-        table.starts_with("E000 control@4 QueryLamp,TakeLamp\n"),
+        table.starts_with("E000 configure,control@4,observe QueryLamp,TakeLamp,WarmLamp\n"),
         "{table}"
     );
 }
@@ -144,11 +201,100 @@ fn every_message_of_the_catalogue_states_what_it_needs() {
         [
             "01F0 observe CreateEvent [4m4]",
             "01F1 observe UpdateEvent [5m4]",
-            "01F6 command CreateCommandEvent [5m4]",
+            "01F6 carry CreateCommandEvent [5m4]",
             "041A command SetElement [1*1(6f2:0)]",
-            "0E00 command SpoolMission [6*2(2*2(6m4.1)*2(2))]",
-            "0E06 command InsertMessages [7*2(6m4.1)]",
-            "0E08 command InsertMissionTask [9*2(6m4.1)*2(2)]",
+            "0E00 command SpoolMission [6*2(2*2(2dm4.1)*2(2))]",
+            "0E06 command InsertMessages [7*2(2dm4.1)]",
+            "0E08 command InsertMissionTask [9*2(2dm4.1)*2(2)]",
         ]
     );
+}
+
+/// Messages that change or move something, or record and store it, by what the standards say of them.
+const COMMANDS: &str = "
+AbortMission AddNoGoZone ApproveMission CBRNCommand CBRNConfigurationCommand CBRNDisplayConfigurationCommand
+CBRNScanWindowConfigurationCommand CancelPortMapping ContinueMission ControlDigitalVideoSensorRecording
+ControlDigitalVideoSensorStream CreateRasterMap CreateVksObjects DeleteElement DeleteRasterMap
+DeleteVksObjects DeleteZone ExecuteList ExecuteListExt InertialSensorControl InsertMessages InsertMissionTask
+PauseMission RegisterDigitalResourceEndpoint RemoveDigitalResourceEndpoint RemoveMessages RemoveMissionTask
+RemoveNoGoZone RequestGPSFix RequestPortMapping ResetOdometry Resume ResumeMission RunMission
+SetAccelerationLimit SetAckermannConfiguration SetActuatorForceTorques SetAnalogVideoSensorConfiguration
+SetAnnunciatorState SetDCM SetDestination SetDigitalAudioOutputSource SetDigitalAudioSensorConfiguration
+SetDigitalVideoSensorConfiguration SetElement SetEndEffectorEffort SetEndEffectorPose
+SetEndEffectorVelocityState SetGeomagneticProperty SetGlobalLoiter SetGlobalOperatingZone SetGlobalPathSegment
+SetGlobalPathSegmentExt SetGlobalPose SetGlobalPoseExt SetGlobalVector SetGlobalVectorExt SetGlobalWaypoint
+SetGlobalWaypointExt SetH264VideoEncodingConfiguration SetIlluminationState SetJointEffort SetJointEfforts
+SetJointMotionProfile SetJointPositions SetJointVelocities SetJointVelocity SetLocalLoiter
+SetLocalOperatingZone SetLocalPathSegment SetLocalPathSegmentExt SetLocalPose SetLocalPoseExt SetLocalVector
+SetLocalVectorExt SetLocalWaypoint SetLocalWaypointExt SetMotionProfile SetPanTiltJointEffort
+SetPanTiltJointEfforts SetPanTiltJointPositions SetPanTiltJointVelocities SetPanTiltJointVelocity
+SetPanTiltMotionProfile SetParkingBrake SetPlatformMode SetPlatformState SetPowerPlantConfiguration
+SetRangeSensorConfiguration SetRasterCells SetSkidSteerEffort SetStabilizerEffort SetStabilizerPosition
+SetStillImageSensorConfiguration SetToolOffset SetTransferCaseState SetTransmissionState SetTravelSpeed
+SetTravelSpeedExt SetVelocityCommand SetVelocityCommandExt SetVideoIlluminatorConfiguration
+SetVisualSensorConfiguration SetVksFeatureClassMetadata SetWrenchEffort SpoolMission Standby StopMission
+TerminateVksDataTransfer UpdateUGVSummary";
+
+/// What a service sends without being a Report…: it changes nothing of its receiver.
+const ANSWERS: &str = "
+ActivateServiceConnection AddNoGoZoneResponse CBDetailedMeasurement CBRN4 CBRNConfigurationState CBRNDetection
+CBRNOperatingState CBRNScanWindowOperatingState CancelEvent ClearEmergency CommandEvent
+ConfirmComponentControl ConfirmDigitalResourceEndpoint ConfirmElementRequest ConfirmEventRequest
+ConfirmPlatformStateRequest ConfirmSensorConfiguration ConfirmServiceConnection CreateEvent
+CreateServiceConnection CreateVksObjects DeleteVksObjects Event GrantPortMapping RNDetailedMeasurement
+RejectComponentControl RejectControl RejectElementRequest RejectEventRequest ReleaseComponentControl
+RequestComponentControl Reset Resume SetComponentAuthority SetDataLinkSelect SetDataLinkStatus
+SetDiscreteDevices SetEmergency SetGlobalPathSegment SetGlobalVector SetGlobalWaypoint SetLocalPathSegment
+SetLocalVector SetLocalWaypoint SetSelectedDataLinkState SetTime SetTravelSpeed SetVelocityState
+SetVksFeatureClassMetadata SetWrenchEffort Shutdown Standby SuspendServiceConnection
+TerminateServiceConnection TerminateVksDataTransfer UpdateEvent";
+
+/// The right that a message needs, by what the standards say that it does.
+fn expected(name: &str) -> &'static str {
+    let is_in = |list: &str| list.split_whitespace().any(|it| it == name);
+    match name {
+        "RequestControl" | "SetAuthority" | "RequestHandoff" | "ConfirmReleaseControl" => "control",
+        "ConfirmControl" | "ConfirmHandoffRequest" => "answer",
+        "ReleaseControl" | "RemoveHandoffRequest" => "release",
+        "SetEmergency" => "emergency",
+        "ClearEmergency" => "clear-emergency",
+        "Shutdown" | "Reset" | "SetTime" => "configure",
+        "CreateCommandEvent" => "carry",
+        // Subscriptions, and what tells a registry or a controller something.
+        "CreateEvent" | "UpdateEvent" | "CancelEvent" | "RegisterServices" => "observe",
+        "RequestReleaseControl" => "observe",
+        _ if is_in(COMMANDS) => "command",
+        _ if name.starts_with("Query") || name.starts_with("Report") || is_in(ANSWERS) => "observe",
+        other => panic!("what does {other} do?"),
+    }
+}
+
+#[test]
+fn every_message_of_the_catalogue_needs_what_the_standards_say_that_it_does() {
+    let library = catalogue();
+    let table = Permissions::of(&library).to_string();
+    let rows: BTreeMap<_, _> = table
+        .lines()
+        .filter(|it| !it.starts_with("service "))
+        .map(|line| {
+            let words: Vec<_> = line.split(' ').collect();
+            let needs = words[1].split(',').map(|it| it.split('@').next().unwrap());
+            (words[0], needs.collect::<BTreeSet<_>>())
+        })
+        .collect();
+    let mut wanted: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
+    for message in library.services().flat_map(|it| it.messages()) {
+        let code = format!("{:04X}", message.code);
+        wanted
+            .entry(code)
+            .or_default()
+            .insert(expected(&message.name));
+    }
+    assert!(wanted.len() > 400, "{}", wanted.len());
+    assert_eq!(rows.len(), wanted.len());
+    for (code, needs) in &wanted {
+        assert_eq!(&rows[&**code], needs, "{code}");
+    }
+    // A query and a command share this code.
+    assert_eq!(rows["F92A"], BTreeSet::from(["command", "observe"]));
 }

@@ -5,6 +5,9 @@
 //! around, so "before" and "after" are neighbours on a circle. A run that has not grown while the
 //! sender advanced by a quarter of the circle is stale: its numbers are about to be reused.
 //!
+//! Fragments of one secure session never complete a message of another one, or of a plain link: only the
+//! first fragment shows what a message is, and so only its session was asked for the right to it.
+//!
 //! Unfinished messages are bounded in octets (including an overhead per piece and run), per sender
 //! and in total, and in time. The oldest runs are dropped first.
 
@@ -23,7 +26,7 @@ use crate::address::JausId;
 use crate::endpoint::arrival::Arrival;
 use crate::endpoint::rate::Origin;
 use crate::endpoint::share::{Ages, Tally};
-use crate::endpoint::{Config, Counter, Counters};
+use crate::endpoint::{Config, Counter, Counters, Path, Remote, SessionId};
 use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version};
 
@@ -104,7 +107,7 @@ impl Run {
     }
 
     /// Joins a run that has both ends; `known` is the sender's style, if known.
-    fn join(&self, (destination, first): Place, known: Option<LargeStyle>) -> Whole {
+    fn join(&self, ((destination, _), first): Place, known: Option<LargeStyle>) -> Whole {
         let (payload, style) = style::join(self.version, &self.pieces, known);
         Whole {
             destination,
@@ -136,8 +139,20 @@ impl Run {
     }
 }
 
-/// The key of a run: the destination, and the number of its first fragment.
-type Place = (JausId, u16);
+/// What all fragments of a message share besides their source: the destination and the session, if any.
+type Channel = (JausId, Option<SessionId>);
+
+/// The key of a run: its channel, and the number of its first fragment.
+type Place = (Channel, u16);
+
+const fn channel(frame: &Frame, path: Path) -> Channel {
+    let session = match path.peer {
+        Remote::Session(session) => Some(session),
+        // The sender may move, or send by several plain links.
+        Remote::Socket(_) | Remote::Line => None,
+    };
+    (frame.destination, session)
+}
 
 /// The unfinished messages of one sender.
 #[derive(Debug)]
@@ -178,12 +193,8 @@ impl Sender {
     }
 
     /// The run that begins at this number, or else the nearest one before it.
-    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<(Place, &Run)> {
-        let up_to = |last| {
-            self.runs
-                .range((destination, 0)..=(destination, last))
-                .next_back()
-        };
+    fn at_or_before(&self, channel: Channel, sequence: u16) -> Option<(Place, &Run)> {
+        let up_to = |last| self.runs.range((channel, 0)..=(channel, last)).next_back();
         let run = up_to(sequence).or_else(|| up_to(u16::MAX));
         run.map(|(&place, run)| (place, run))
     }
@@ -215,12 +226,12 @@ impl Sender {
         counters: &mut Counters,
     ) -> Result<Option<(Place, Run)>, Counter> {
         let frame = arrival.frame;
-        let (destination, sequence) = (frame.destination, frame.sequence);
+        let (channel, sequence) = (channel(frame, arrival.path), frame.sequence);
         let data = frame.flags.data();
         let ahead = sequence.wrapping_sub(self.latest).cast_signed();
         self.latest = sequence;
         self.position += i64::from(ahead);
-        if let Some((place, known)) = self.at_or_before(destination, sequence)
+        if let Some((place, known)) = self.at_or_before(channel, sequence)
             && known.covers(place.1, sequence)
         {
             // Most retransmissions were filtered before, so this is a restarted sender; but a
@@ -244,7 +255,7 @@ impl Sender {
             updated: arrival.now,
             position: self.position,
         };
-        let place = self.insert(destination, sequence, run);
+        let place = self.insert(channel, sequence, run);
         let Some(run) = self.runs.get(&place) else {
             return Ok(None);
         };
@@ -258,9 +269,9 @@ impl Sender {
     }
 
     /// Inserts a new fragment next to its neighbours; returns the key of the run that holds it.
-    fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
-        let mut place = (destination, first);
-        let before = self.at_or_before(destination, first.wrapping_sub(1));
+    fn insert(&mut self, channel: Channel, first: u16, mut run: Run) -> Place {
+        let mut place = (channel, first);
+        let before = self.at_or_before(channel, first.wrapping_sub(1));
         if let Some((before, known)) = before
             && known.last.wrapping_add(1) == first
             && known.is_continued_by(&run)
@@ -270,7 +281,7 @@ impl Sender {
             longer.append(run);
             (place, run) = (before, longer);
         }
-        let after = (destination, run.last.wrapping_add(1));
+        let after = (channel, run.last.wrapping_add(1));
         if let Some(known) = self.runs.get(&after)
             && run.is_continued_by(known)
             && !self.is_stale(known)
@@ -359,11 +370,11 @@ impl Reassembly {
 
     /// Whether this fragment is the next one of an unfinished message. In that case it is not a
     /// retransmission: its sender has restarted with the same numbers.
-    pub(in crate::endpoint) fn awaits(&self, frame: &Frame) -> bool {
+    pub(in crate::endpoint) fn awaits(&self, frame: &Frame, path: Path) -> bool {
         let continues = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
         let number = frame.sequence.wrapping_sub(1);
         let is_begun = |sender: &Sender| {
-            let run = sender.at_or_before(frame.destination, number);
+            let run = sender.at_or_before(channel(frame, path), number);
             run.is_some_and(|(_, run)| {
                 run.begins && !run.ends && run.last == number && !sender.is_stale(run)
             })
@@ -371,19 +382,24 @@ impl Reassembly {
         continues && self.senders.get(&frame.source).is_some_and(is_begun)
     }
 
-    /// Finishes the large message whose end is shown by `number`, the sequence number of the next
-    /// whole message. JAUS++ does not mark the end of a message that fills its fragments, and
+    /// Finishes the large message whose end is shown by the sequence number of the next whole message from
+    /// its sender, by the same session if any. JAUS++ does not mark the end of a message that fills its fragments, and
     /// reuses the number of the last fragment for the next message. See "no last fragment" in
     /// [`peer`](crate::peer#the-table).
-    pub(in crate::endpoint) fn finish(&mut self, source: JausId, number: u16) -> Option<Whole> {
+    pub(in crate::endpoint) fn finish(&mut self, next: &Frame, path: Path) -> Option<Whole> {
+        let (source, number, (_, session)) = (next.source, next.sequence, channel(next, path));
         let sender = self.senders.get(&source)?;
-        let from = (number, (JausId::from_u32(0), 0));
+        let from = (number, ((JausId::from_u32(0), None), 0));
         let ending = sender.ends.range(from..).map_while(|&(last, place)| {
             let run = sender.runs.get(&place)?;
             (last == number).then_some((place, run))
         });
-        let is_whole = |(_, run): &(Place, &Run)| {
-            run.begins && !run.ends && style::may_lack_the_mark(run.version, &run.pieces)
+        let is_whole = |(place, run): &(Place, &Run)| {
+            let is_of_session = place.0.1 == session;
+            is_of_session
+                && run.begins
+                && !run.ends
+                && style::may_lack_the_mark(run.version, &run.pieces)
         };
         let (place, _) = ending.take(MOST_ENDING).find(is_whole)?;
         let run = self.change(source, |sender| sender.take(place))??;

@@ -309,6 +309,29 @@ fn a_message_for_others_is_neither_decided_on_nor_answered() {
 }
 
 #[test]
+fn a_stop_for_all_reaches_those_that_its_sender_may_reach() {
+    let grant = |text: String| text.parse().unwrap();
+    let access = Access {
+        grants: vec![
+            grant(format!("42 with={US},9.9.9")),
+            grant("43 with=9.9.9".to_owned()),
+        ],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    let stop = Bytes::from_static(b"\x06\0\x01\0");
+    for (source, is_heard) in [("42.1.1", true), ("43.1.1", false)] {
+        rig.hear(&Frame::new(id(source), JausId::EVERYONE, stop.clone()));
+        let heard: Vec<_> = rig.received();
+        assert_eq!(!heard.is_empty(), is_heard, "{source}");
+    }
+    assert_eq!(rig.count(Counter::NotGranted), 0);
+}
+
+#[test]
 fn a_bound_id_is_refused_from_other_networks_and_counted() {
     let access = Access {
         bind: vec!["42.255.255@10.0.0.2".parse().unwrap()],

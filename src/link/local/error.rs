@@ -35,7 +35,8 @@ pub enum Error {
     /// The process at the other end belongs to another user.
     #[error(
         "the process at the other end of {place} belongs to user {uid}, not to our user {own} or \
-         root: run components and node as one user, or choose another address"
+         root: run components and node as one user, or set `local_group` of the node and attach as a \
+         member of its group, at a socket in a directory where only the node's user and root can write"
     )]
     Foreign {
         /// The address.

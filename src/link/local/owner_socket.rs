@@ -6,7 +6,7 @@ use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
 use super::address::{default_directory, own_uid};
-use super::unix_socket::{accept_owner, listen, make_default};
+use super::unix_socket::{Users, accept_owner, listen, make_default};
 use crate::link::socket_file::SocketFile;
 
 /// A listening Unix socket that only its owner and root can use: its mode is 0600, no other user can
@@ -33,7 +33,7 @@ impl OwnerSocket {
         if path.parent() == Some(&default_directory()) {
             make_default()?;
         }
-        let (listener, file) = listen(path)?;
+        let (listener, file) = listen(path, Users::Owner)?;
         Ok(Self { listener, file })
     }
 

@@ -1,7 +1,7 @@
 //! A node's Unix socket: directory and socket with their permissions.
 //!
 //! The socket is in a directory where no other user can replace it, and is accessible to the owner
-//! alone. In addition the operating system reports the user of each connecting process.
+//! alone, or to a group. In addition the operating system reports the user of each connecting process.
 
 use std::fs::{self, DirBuilder};
 use std::io::ErrorKind;
@@ -16,11 +16,30 @@ use super::address::{default_directory, default_path, own_uid};
 use super::stream::{Stream, pid_of, unix_stream};
 use crate::link::socket_file::{Obstacle, SocketFile};
 
+/// Which processes may connect, besides those of root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Users {
+    /// Those of the user of this process.
+    Owner,
+    /// Those whose groups contain the group of this process. The kernel checks it by the mode of the
+    /// socket; they may be of any user.
+    Group,
+}
+
+impl Users {
+    const fn mode(self) -> u32 {
+        match self {
+            Self::Owner => 0o600,
+            Self::Group => 0o660,
+        }
+    }
+}
+
 /// Listens at a path. Dropping the file removes it.
-pub(super) fn listen(path: &Path) -> Result<(UnixListener, SocketFile), Error> {
+pub(super) fn listen(path: &Path, users: Users) -> Result<(UnixListener, SocketFile), Error> {
     check_directory(parent(path), own_uid(), 0o022)?;
     let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
-    let bound = SocketFile::bind(path, Type::STREAM, 0o600);
+    let bound = SocketFile::bind(path, Type::STREAM, users.mode());
     let (socket, file) = bound.map_err(|obstacle| match obstacle {
         Obstacle::Alive(other) => Error::Served(path.to_owned(), other.and_then(server_of)),
         Obstacle::NoSocket => Error::NoSocket(path.to_owned()),
@@ -31,12 +50,16 @@ pub(super) fn listen(path: &Path) -> Result<(UnixListener, SocketFile), Error> {
 }
 
 /// Waits for the next component.
-pub(super) async fn accept(listener: &UnixListener, path: &Path) -> Result<Stream, Error> {
+pub(super) async fn accept(
+    listener: &UnixListener,
+    path: &Path,
+    users: Users,
+) -> Result<Stream, Error> {
     let accepted = listener.accept().await;
     let stream = accepted.and_then(|(stream, _)| unix_stream(stream));
     let (stream, uid) = stream.map_err(Error::io("accepting a component"))?;
     let own = own_uid();
-    if !may_attach(uid, own) {
+    if users == Users::Owner && !may_attach(uid, own) {
         let place = path.display().to_string();
         return Err(Error::Foreign { place, uid, own });
     }
@@ -67,6 +90,19 @@ fn server_of(socket: Socket) -> Option<u32> {
 /// Accepts components of the owner and of root.
 const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
+}
+
+/// Whether nobody but root and this user can have put the socket at its path: each folder on the way
+/// belongs to one of them, and no one else may write to it. A process may then attach to a node of
+/// another user that it was told to attach to.
+pub(super) fn is_guarded_by(path: &Path, uid: u32) -> bool {
+    let is_guarded = |folder: &Path| {
+        fs::metadata(folder)
+            .is_ok_and(|it| (it.uid() == uid || it.uid() == 0) && it.mode() & 0o022 == 0)
+    };
+    // Symbolic links on the way could be those of others.
+    let whole = fs::canonicalize(path);
+    whole.is_ok_and(|whole| whole.ancestors().skip(1).all(is_guarded))
 }
 
 /// The default path, in a directory that exists and is accessible to the owner alone.
@@ -137,5 +173,18 @@ mod tests {
     fn only_the_owner_and_root_may_attach() {
         assert!(may_attach(1000, 1000) && may_attach(0, 1000));
         assert!(!may_attach(1001, 1000) && !may_attach(1000, 0));
+    }
+
+    #[test]
+    fn a_socket_in_a_folder_that_others_can_write_to_may_be_anybodys() {
+        // The folder of temporary files is everybody's.
+        let name = format!("jaus-guarded-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        fs::write(&path, "").unwrap();
+        assert!(!is_guarded_by(&path, own_uid()));
+        fs::remove_file(&path).unwrap();
+        assert!(is_guarded_by(Path::new("/usr/bin"), 0));
+        assert!(is_guarded_by(Path::new("/usr/bin"), 4711), "root's");
+        assert!(!is_guarded_by(Path::new("/nowhere/node.sock"), 0));
     }
 }

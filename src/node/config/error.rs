@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use crate::address::ParseIdError;
 use crate::link::InvalidGroup;
+use crate::rights::GrantError;
 
 /// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -26,6 +27,9 @@ pub enum ConfigError {
          behind its clients. Remove one of them"
     )]
     JuniorForward,
+    /// The words of a grant are wrong.
+    #[error("access.grants: {0}")]
+    Grant(#[from] GrantError),
     /// Two lines on one device.
     #[error("the serial port {0} appears twice: remove one entry")]
     SerialTwice(String),

@@ -14,6 +14,7 @@
 //! ttl = 16
 //! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
 //! local = "default"                    # or a path, or "off" (the default)
+//! local_group = true                   # also for processes of this process's group
 //! junior = "/tmp"                      # through Junior's node manager in the place of UDP (Unix)
 //! max_message = "4MiB"                 # sizes: octets, or with a unit (see `units`)
 //!
@@ -123,6 +124,9 @@ pub struct Config {
     pub mailbox: MailboxLimits,
     /// The local address where component processes of this host may attach, if any.
     pub local: Local,
+    /// Whether processes of this process's group may attach there too, so that the parts of a vehicle
+    /// run as users of their own. Concerns sockets of the file system.
+    pub local_group: bool,
     /// The folder of Junior's sockets, `/tmp` in a default installation. If set, the components are
     /// clients of the node manager of a Junior on this host, and the node opens no UDP itself:
     /// Junior determines interfaces, port, group and peers.
@@ -174,6 +178,7 @@ impl Config {
             max_message: endpoint.max_message,
             mailbox: MailboxLimits::default(),
             local: Local::Off,
+            local_group: false,
             #[cfg(unix)]
             junior: None,
             tcp: Tcp::default(),
@@ -303,6 +308,7 @@ impl Config {
         }
         limits::validate(&self.routing, &self.limits)?;
         self.delivery.validate()?;
+        self.access.verify_grants()?;
         Ok(self.udp().validate()?)
     }
 

@@ -26,6 +26,16 @@ async fn the_socket_is_its_owners_alone_and_goes_with_the_node() {
 }
 
 #[tokio::test]
+async fn the_socket_is_its_groups_too_if_the_settings_say_so() {
+    let place = Place::new();
+    let mut config = place.config();
+    config.local_group = true;
+    let _node = Node::start(config).unwrap();
+    let mode = fs::metadata(place.path()).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o660);
+}
+
+#[tokio::test]
 async fn a_directory_that_others_can_change_is_refused_with_the_remedy() {
     let place = Place::new();
     let directory = place.path().parent().unwrap().to_owned();

@@ -31,4 +31,6 @@ mod store;
 mod support;
 mod tool;
 #[cfg(target_os = "linux")]
+mod units;
+#[cfg(target_os = "linux")]
 mod up;

@@ -137,7 +137,7 @@ fn no_unit_may_do_more_than_it_must() {
         "PrivateDevices=yes",
         "MemoryDenyWriteExecute=yes",
         "RestartPreventExitStatus=2",
-        "User=jaus",
+        "User=jaus-%i",
     ] {
         assert!(unit.contains(setting), "{setting}");
     }

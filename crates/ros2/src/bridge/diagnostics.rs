@@ -115,7 +115,7 @@ impl BridgeState<'_> {
             obstacle => (Level::Warn, obstacle),
         };
         let authority = self.authority.map_or_else(
-            || "none (--control allows commands)".to_owned(),
+            || "none (--allow gives ROS rights)".to_owned(),
             |authority| authority.to_string(),
         );
         let mut values = vec![
@@ -129,8 +129,10 @@ impl BridgeState<'_> {
             Counter::OtherPublisher,
             Counter::Outdated,
             Counter::Locked,
-            Counter::ReadOnly,
+            Counter::Forbidden,
+            Counter::Unannounced,
             Counter::GoalRefused,
+            Counter::EmergencyRefused,
             Counter::ClearRefused,
             Counter::Malformed,
             Counter::NotTaken,

@@ -272,6 +272,7 @@ mod tests {
         let passed = now.saturating_duration_since(*FIRST.get_or_init(|| now));
         Command {
             publisher,
+            session: publisher,
             sequence: SEQUENCE.fetch_add(1, Ordering::Relaxed),
             stamp: i64::try_from(passed.as_nanos()).unwrap(),
             arrival: now,

@@ -73,6 +73,8 @@ const REPETITION: Duration = Duration::from_millis(40);
 const SHORTEST: Duration = Duration::from_millis(10);
 /// Timeout of an emergency before it is repeated, and of the query for the state.
 const ALARM_PATIENCE: Duration = Duration::from_millis(700);
+/// The code of the emergencies that ROS sets and clears.
+pub(super) const EMERGENCY: u16 = 1;
 /// Timeout of an order about a goal.
 const ORDER_PATIENCE: Duration = Duration::from_secs(3);
 
@@ -102,10 +104,11 @@ impl Jobs {
         }
     }
 
-    pub(super) fn begin(&mut self, is_drive: bool, peer: JausId, authority: u8) {
+    /// Begins a session that takes control of a component, and makes it ready if it may.
+    pub(super) fn begin(&mut self, is_drive: bool, peer: JausId, authority: u8, may_resume: bool) {
         let component = self.component.clone();
         self.tasks.spawn(async move {
-            let result = lease::begin(&component, peer, authority).await;
+            let result = lease::begin(&component, peer, authority, may_resume).await;
             Finished::Begun {
                 is_drive,
                 peer,
@@ -235,11 +238,11 @@ async fn within<T>(limit: Duration, future: impl Future<Output = T>) -> Option<T
 async fn deliver_emergency(component: &Component, peer: JausId, on: bool) {
     let priority = Priority::SafetyCritical;
     let delivered = if on {
-        let emergency_code = EmergencyCode(1);
+        let emergency_code = EmergencyCode(EMERGENCY);
         let set = SetEmergency { emergency_code };
         component.deliver_with(priority, peer, &set).await
     } else {
-        let emergency_code = ClearedCode(1);
+        let emergency_code = ClearedCode(EMERGENCY);
         let clear = ClearEmergency { emergency_code };
         component.deliver_with(priority, peer, &clear).await
     };

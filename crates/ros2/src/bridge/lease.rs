@@ -142,15 +142,20 @@ impl Lease {
     }
 }
 
-/// Begins a session that makes the component ready and takes control once.
+/// Begins a session that takes control once, and makes the component ready if it may.
 pub(super) async fn begin(
     component: &Component,
     peer: JausId,
     authority: u8,
+    may_resume: bool,
 ) -> Result<Session, SessionError> {
+    let target = match may_resume {
+        true => TargetState::Ready,
+        false => TargetState::AsFound,
+    };
     let settings = SessionSettings::new(authority)
         .retake(Retake::Never)
-        .target(TargetState::Ready);
+        .target(target);
     component.session(peer, settings).await
 }
 

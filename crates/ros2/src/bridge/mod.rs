@@ -25,14 +25,17 @@ mod publishers;
 mod report;
 mod report_topics;
 mod reports;
+mod rights;
 mod runner;
 pub mod samples;
+mod sequence;
 pub mod stamp;
 mod topics;
 pub mod vehicle;
 pub mod velocity;
 
 use jaus::component::Component;
+use jaus::rights::Rules;
 use jaus::service::TimeOfDay;
 use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
@@ -57,12 +60,8 @@ pub struct Settings {
     pub vehicle: Selection,
     /// The rate of poses, velocities, positions and further reports, in hertz.
     pub rate_hz: f64,
-    /// The authority with which control is requested, 0 to 255; `None` refuses all commands.
-    pub control: Option<u8>,
-    /// Whether ROS can set emergencies without `control`, which includes this.
-    pub allow_emergency: bool,
-    /// Whether ROS can clear the emergencies that it has set.
-    pub allow_clear: bool,
+    /// What ROS may do. Control is requested with the authority of `control`.
+    pub rules: Rules,
     /// Times and limits of driving.
     pub drive: DriveSettings,
     /// The speed on the way to goals, in m/s.
@@ -72,15 +71,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Settings for a vehicle: read-only without emergencies, 10 Hz, goals at 1 m/s, in the frame `map`.
+    /// Settings for a vehicle: ROS watches ([`Rules::watch`]), 10 Hz, goals at 1 m/s, in the frame `map`.
     #[must_use]
     pub fn new(vehicle: Selection) -> Self {
         Self {
             vehicle,
             rate_hz: 10.0,
-            control: None,
-            allow_emergency: false,
-            allow_clear: false,
+            rules: Rules::watch(),
             drive: DriveSettings::default(),
             goal_speed: 1.0,
             map_frame: "map".to_owned(),

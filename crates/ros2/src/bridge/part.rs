@@ -4,6 +4,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 
 use jaus_vehicle::parts::{Part, PartError, Slot};
+use jaus_zenoh::NetworkSettings;
 use tokio::sync::mpsc;
 
 use super::messages::Types;
@@ -64,6 +65,9 @@ impl Bridge {
         session: &session::Settings,
     ) -> Result<Self, BridgeError> {
         settings.map_frame.clone_from(&topics.frames.map);
+        if !settings.rules.only_watch() {
+            warn_without_proof(&session.network)?;
+        }
         let types = Types::bundled().map_err(|error| BridgeError::Type(error.to_string()))?;
         let report_topics = ReportTopics::new(&reports).map_err(BridgeError::Type)?;
         let ros = Ros::open(session)?;
@@ -75,6 +79,17 @@ impl Bridge {
             reports,
         })
     }
+}
+
+/// Warns if links of the ROS network do not prove who is at their other end: every node that reaches it has the
+/// rights of ROS.
+fn warn_without_proof(network: &NetworkSettings) -> Result<(), SessionError> {
+    if let Err(reason) = jaus_zenoh::check_proof(&network.config()?) {
+        tracing::warn!(
+            "whoever reaches this ROS network has the rights of --allow, because {reason}"
+        );
+    }
+    Ok(())
 }
 
 /// The name of the node in the ROS graph.

@@ -23,6 +23,8 @@ pub enum Input {
     EmergencyStop(bool),
     /// A `release`: give up control and cancel the goal.
     Release,
+    /// A message whose publisher has no liveliness token on its topic: its gid is made up.
+    Unannounced(Gid),
     /// A publisher of `cmd_vel` is gone.
     PublisherGone(Gid),
     /// Messages were lost on the ROS side.
@@ -41,6 +43,8 @@ pub enum Input {
 pub struct Command {
     /// The publisher.
     pub publisher: Gid,
+    /// The session of the publisher: the hash of the id that its token states.
+    pub session: Gid,
     /// The number of the message among those of its publisher.
     pub sequence: i64,
     /// When it was sent, in nanoseconds by the clock of the sender.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use super::ports::Command;
+use super::sequence::{Run, SILENCE};
 use crate::graph::Gid;
 
 /// Why a command is too old to be used.
@@ -13,6 +14,9 @@ pub enum Outdated {
     /// A command with this sequence number or a later one arrived before.
     #[error("it was sent before another command that has arrived")]
     Reordered,
+    /// Its sequence number is far from those of its publisher. If the next ones continue it, they are used.
+    #[error("its sequence number is far from the last one of its publisher")]
+    Jumped,
     /// It took longer than the fastest one by more than the timeout.
     #[error(
         "it was delayed by more than --timeout; if the clock of its host was set, pause for 10 s"
@@ -22,7 +26,7 @@ pub enum Outdated {
     #[error("its publisher has left the ROS network")]
     PublisherGone,
     /// There are too many publishers.
-    #[error("more than 64 publishers send velocities")]
+    #[error("more than 64 publishers send velocities, or more than 16 of one session")]
     TooManyPublishers,
 }
 
@@ -35,9 +39,15 @@ pub(super) struct Publishers {
 
 #[derive(Debug)]
 struct Publisher {
+    /// The hash of the id of its session.
+    session: Gid,
     /// The last command of any kind, or the end of the publisher.
     heard: Instant,
-    last: Option<Last>,
+    /// Its commands, the last ones.
+    run: Option<Run>,
+    /// Commands with its gid whose numbers are far from those. Somebody else uses its gid, or its numbers have
+    /// jumped: nobody can tell, so that none of both keeps the other one out.
+    other_run: Option<Run>,
     /// The last command that moves, after which the publisher has neither stopped nor paused.
     moved: Option<Instant>,
     is_blocked: bool,
@@ -47,29 +57,15 @@ struct Publisher {
     gone: Option<Instant>,
 }
 
-/// The last command that was fresh.
-#[derive(Debug, Clone, Copy)]
-struct Last {
-    arrival: Instant,
-    sequence: i64,
-    stamp: i64,
-    /// How much longer than the fastest command it took, in nanoseconds. The offset of the clocks, and
-    /// with it the whole delay, is unknown.
-    excess: i128,
-}
-
 impl Publishers {
     /// The most publishers.
     const MOST: usize = 64;
-    /// A publisher is forgotten after this silence. By then zenoh has closed a connection that was
-    /// interrupted, so that nothing from before it can arrive.
-    const SILENCE: Duration = Duration::from_secs(10);
-    /// One that was blocked before its silence is known for longer.
+    /// The most publishers of one session.
+    const MOST_OF_SESSION: usize = 16;
+    /// A publisher is forgotten after this silence.
     const LONG_SILENCE: Duration = Duration::from_secs(600);
     /// The shortest pause of a blocked publisher, also with a shorter timeout.
     const SHORTEST_PAUSE: Duration = Duration::from_millis(500);
-    /// One part in this many of the time passed is not counted as delay, because clocks drift.
-    const DRIFT: i128 = 1000;
 
     pub(super) const fn new(timeout: Duration) -> Self {
         Self {
@@ -88,9 +84,8 @@ impl Publishers {
     ) -> Result<(), Outdated> {
         self.handle_time(now);
         let timeout = self.timeout;
-        let publisher = self.entry(now, command.publisher);
+        let publisher = self.entry(now, command.publisher, Some(command.session));
         let publisher = publisher.ok_or(Outdated::TooManyPublishers)?;
-        let silence = now.saturating_duration_since(publisher.heard);
         publisher.heard = now;
         if moves {
             publisher.moved = Some(now);
@@ -101,12 +96,7 @@ impl Publishers {
         if now >= command.arrival + timeout {
             return Err(Outdated::Late);
         }
-        let before = publisher.last;
-        publisher.last = Some(match before {
-            Some(last) if silence < Self::SILENCE => last.followed_by(command, timeout)?,
-            _ => Last::first(command),
-        });
-        let went_on = before.is_some_and(|last| command.sequence > last.sequence.saturating_add(1));
+        let went_on = publisher.advance(now, command, timeout)?;
         publisher.is_blocked |= std::mem::take(&mut publisher.is_silent) && went_on;
         if !moves {
             publisher.moved = None;
@@ -132,7 +122,7 @@ impl Publishers {
     /// Refuses the commands of a publisher that arrive after its end.
     pub(super) fn handle_gone(&mut self, now: Instant, publisher: Gid) {
         self.handle_time(now);
-        if let Some(publisher) = self.entry(now, publisher) {
+        if let Some(publisher) = self.entry(now, publisher, None) {
             publisher.heard = now;
             publisher.gone = Some(now);
         }
@@ -147,22 +137,38 @@ impl Publishers {
             }
             publisher.gone = publisher.gone.filter(|gone| now < *gone + timeout);
         }
-        self.known.retain(|_, publisher| {
-            let silence = match publisher.is_silent {
-                true => Self::LONG_SILENCE,
-                false => Self::SILENCE,
-            };
-            now < publisher.heard + silence
-        });
+        self.known
+            .retain(|_, publisher| now < publisher.heard + Self::LONG_SILENCE);
     }
 
-    /// The publisher, which is added if there is room.
-    fn entry(&mut self, now: Instant, publisher: Gid) -> Option<&mut Publisher> {
-        let has_room = self.known.len() < Self::MOST || self.known.contains_key(&publisher);
+    /// Forgets who has been silent, if the table is full. Who was blocked before stays known.
+    fn make_room(&mut self, now: Instant) {
+        if self.known.len() >= Self::MOST {
+            let stays = |it: &Publisher| it.is_silent || now < it.heard + SILENCE;
+            self.known.retain(|_, publisher| stays(publisher));
+        }
+    }
+
+    /// The publisher, which is added if its session is given and there is room.
+    fn entry(
+        &mut self,
+        now: Instant,
+        publisher: Gid,
+        session: Option<Gid>,
+    ) -> Option<&mut Publisher> {
+        if self.known.contains_key(&publisher) {
+            return self.known.get_mut(&publisher);
+        }
+        let session = session?;
+        self.make_room(now);
+        let of_session = self.known.values().filter(|it| it.session == session);
+        let has_room = self.known.len() < Self::MOST && of_session.count() < Self::MOST_OF_SESSION;
         has_room.then(|| {
             self.known.entry(publisher).or_insert(Publisher {
+                session,
                 heard: now,
-                last: None,
+                run: None,
+                other_run: None,
                 moved: None,
                 is_blocked: false,
                 is_silent: false,
@@ -172,44 +178,47 @@ impl Publishers {
     }
 }
 
-impl Last {
-    const fn first(command: &Command) -> Self {
-        Self {
-            arrival: command.arrival,
-            sequence: command.sequence,
-            stamp: command.stamp,
-            excess: 0,
+impl Publisher {
+    /// Enters a command that is fresh; returns whether commands are missing before it.
+    fn advance(
+        &mut self,
+        now: Instant,
+        command: &Command,
+        timeout: Duration,
+    ) -> Result<bool, Outdated> {
+        let new = Run::new(now, command);
+        // Whichever run goes on: if it is ahead of the one before, commands were lost in between.
+        let main = self.run.map(|run| run.sequence());
+        let went_on = main.is_some_and(|main| command.sequence > main.saturating_add(1));
+        let is_next = |run: &&mut Run| run.is_continued_by(command);
+        if let Some(run) = self.run.as_mut().filter(is_next) {
+            return run.advance(now, command, timeout).map(|()| went_on);
         }
-    }
-
-    /// The next command, if it is fresh.
-    fn followed_by(self, command: &Command, timeout: Duration) -> Result<Self, Outdated> {
-        if command.sequence <= self.sequence {
+        if let Some(run) = self.other_run.as_mut().filter(is_next) {
+            run.advance(now, command, timeout)?;
+            std::mem::swap(&mut self.run, &mut self.other_run);
+            return Ok(went_on);
+        }
+        let mut runs = self.run.iter_mut().chain(&mut self.other_run);
+        if let Some(run) = runs.find(|run| !run.is_over(now) && run.is_before(command)) {
+            run.hear(now);
             return Err(Outdated::Reordered);
         }
-        let next = Self::first(command);
-        let passed = nanoseconds(self.arrival, command.arrival);
-        let between = i128::from(command.stamp) - i128::from(self.stamp);
-        if between < 0 {
-            // The clock of the publisher was set back: the sequence number says that it is later.
-            return Ok(next);
+        match self.run {
+            None => {
+                self.run = Some(new);
+                Ok(false)
+            }
+            // Its commands from before have arrived long ago, so this is a new run.
+            Some(run) if run.is_over(now) => {
+                self.other_run = self.run.replace(new);
+                Ok(went_on)
+            }
+            Some(_) => {
+                self.other_run = Some(new);
+                Err(Outdated::Jumped)
+            }
         }
-        let drift = passed.max(0) / Publishers::DRIFT;
-        let excess = (self.excess + passed - between - drift).max(0);
-        let limit = i128::try_from(timeout.as_nanos()).unwrap_or(i128::MAX);
-        match excess > limit {
-            true => Err(Outdated::Late),
-            false => Ok(Self { excess, ..next }),
-        }
-    }
-}
-
-/// From one time to another, which may be earlier.
-fn nanoseconds(from: Instant, to: Instant) -> i128 {
-    let signed = |time: Duration| i128::try_from(time.as_nanos()).unwrap_or(i128::MAX);
-    match to.checked_duration_since(from) {
-        Some(later) => signed(later),
-        None => -signed(from.saturating_duration_since(to)),
     }
 }
 
@@ -221,10 +230,12 @@ fn nanoseconds(from: Instant, to: Instant) -> i128 {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::sequence::FAR;
     use super::super::velocity::Twist;
     use super::*;
 
     const ONE: Gid = Gid([1; 16]);
+    const SESSION: Gid = Gid([9; 16]);
     const TIMEOUT: Duration = Duration::from_millis(500);
     const MS: i64 = 1_000_000;
 
@@ -249,6 +260,7 @@ mod tests {
         fn command(&self, arrival: u64, sequence: i64, stamp: i64) -> Command {
             Command {
                 publisher: ONE,
+                session: SESSION,
                 sequence,
                 stamp: stamp * MS,
                 arrival: self.at(arrival),
@@ -338,6 +350,21 @@ mod tests {
     }
 
     #[test]
+    fn a_silence_in_which_a_blocked_publisher_sent_many_commands_is_no_pause() {
+        for silence in [2_000, 9_000, 60_000] {
+            let mut network = Network::new();
+            assert_eq!(network.receive(0, 7, 0), Ok(()));
+            network.publishers.block(network.at(10));
+            let back = 10 + silence;
+            // The first one may be refused, because it might be forged.
+            let _first = network.receive(back, 900, back as i64);
+            let next = network.receive(back + 50, 901, back as i64 + 50);
+            assert_eq!(next, Ok(()), "{silence}");
+            assert!(network.publishers.is_blocked(ONE), "{silence}");
+        }
+    }
+
+    #[test]
     fn the_last_commands_of_a_publisher_that_is_gone_are_refused_for_the_timeout() {
         let mut network = Network::new();
         assert_eq!(network.receive(0, 1, 0), Ok(()));
@@ -354,10 +381,99 @@ mod tests {
         for number in 0..65 {
             let mut command = network.command(0, 1, 0);
             command.publisher = Gid([number; 16]);
+            command.session = Gid([number / 16; 16]);
             let checked = network.publishers.check(network.start, &command, true);
             assert_eq!(checked.is_ok(), number < 64, "{number}");
         }
         assert_eq!(network.receive(1, 2, 1), Ok(()), "a known one");
+    }
+
+    #[test]
+    fn one_session_has_its_share_of_the_table() {
+        let mut network = Network::new();
+        for number in 0..17 {
+            let mut command = network.command(0, 1, 0);
+            command.publisher = Gid([10 + number; 16]);
+            let checked = network.publishers.check(network.start, &command, true);
+            assert_eq!(checked.is_ok(), number < 16, "{number}");
+        }
+        let mut command = network.command(0, 1, 0);
+        command.session = Gid([8; 16]);
+        let other = network.publishers.check(network.start, &command, true);
+        assert_eq!(other, Ok(()));
+    }
+
+    #[test]
+    fn a_forged_number_does_not_keep_its_publisher_out() {
+        let near = 1_000_000;
+        for forged in [1 << 62, i64::MAX, i64::MIN, near, -near - 1] {
+            let mut network = Network::new();
+            assert_eq!(network.receive(0, 7, 0), Ok(()));
+            for step in 0..100 {
+                let at = 50 * (step as u64 + 1);
+                let refused = network.receive(at, forged, i64::from(step));
+                assert!(refused.is_err(), "{forged}");
+                let next = network.receive(at + 1, 8 + i64::from(step), at as i64 + 1);
+                assert_eq!(next, Ok(()), "{forged} {step}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_that_was_forged_first_costs_its_publisher_one_command() {
+        let mut network = Network::new();
+        assert_eq!(network.receive(0, 1 << 62, 0), Ok(()));
+        assert_eq!(network.receive(50, 5, 50), Err(Outdated::Jumped));
+        for step in 1..100 {
+            let at = 50 * (step + 1);
+            assert_eq!(network.receive(at, 5 + step as i64, at as i64), Ok(()));
+            // The other one goes on.
+            let other = (1 << 62) + step as i64;
+            assert_eq!(network.receive(at + 1, other, at as i64), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_number_that_was_forged_in_a_pause_does_not_keep_its_publisher_out() {
+        let mut network = Network::new();
+        assert_eq!(network.receive(0, 7, 0), Ok(()));
+        for step in 0..100 {
+            let at = 60_000 + 50 * step;
+            // Within the numbers that an earlier command could have.
+            let forged = 500_000 + step as i64;
+            assert_eq!(network.receive(at, forged, at as i64), Ok(()));
+            let next = network.receive(at + 1, 8 + step as i64, at as i64 + 1);
+            assert_eq!(next, Ok(()), "{step}");
+        }
+    }
+
+    #[test]
+    fn a_full_table_forgets_who_is_silent() {
+        let mut network = Network::new();
+        for number in 0..64 {
+            let mut command = network.command(0, 1, 0);
+            command.publisher = Gid([10 + number; 16]);
+            command.session = Gid([number / 16; 16]);
+            let checked = network.publishers.check(network.start, &command, true);
+            assert_eq!(checked, Ok(()));
+        }
+        let full = Err(Outdated::TooManyPublishers);
+        assert_eq!(network.receive(9_999, 1, 9_999), full);
+        assert_eq!(network.receive(10_000, 2, 10_000), Ok(()));
+    }
+
+    #[test]
+    fn a_forged_number_that_is_near_is_overtaken_within_seconds() {
+        let mut network = Network::new();
+        assert_eq!(network.receive(0, 7, 0), Ok(()));
+        // The number may be ahead by as much as commands of 1 kHz could have been lost.
+        assert_eq!(network.receive(50, 7 + 150, 50), Ok(()));
+        let next = |step: u64| (100 + 50 * step, 8 + step as i64, 100 + 50 * step as i64);
+        let mut taken = (0..200).filter(|step| {
+            let (arrival, sequence, stamp) = next(*step);
+            network.receive(arrival, sequence, stamp).is_ok()
+        });
+        assert_eq!(taken.next(), Some(150), "7.5 s at 20 Hz");
     }
 
     /// Publisher, sequence number, stamp, milliseconds since the command before, and whether it moves.
@@ -380,6 +496,7 @@ mod tests {
                 let publisher = Gid([publisher; 16]);
                 let command = Command {
                     publisher,
+                    session: SESSION,
                     sequence,
                     stamp,
                     arrival: now,
@@ -388,7 +505,9 @@ mod tests {
                 let is_fresh = publishers.check(now, &command, moves).is_ok();
                 prop_assert!(publishers.known.len() <= Publishers::MOST);
                 if is_fresh && let Some((before, at)) = accepted.insert(publisher, (sequence, now)) {
-                    prop_assert!(sequence > before || now - at >= Publishers::SILENCE);
+                    let is_far = i128::from(before) - i128::from(sequence) > FAR;
+                    let is_over = now - at >= SILENCE;
+                    prop_assert!(sequence > before || is_far || is_over);
                 }
             }
         }

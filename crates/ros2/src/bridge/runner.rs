@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use jaus::address::JausId;
 use jaus::component::Component;
 use jaus::node::now;
+use jaus::rights::Refusal as Forbidden;
 use jaus::service::{Directory, State, TimeOfDay};
 use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
@@ -24,6 +25,7 @@ use super::jobs::{Finished, Jobs};
 use super::lease::Lease;
 use super::ports::{Command, GoalPose, Input, Output};
 use super::report::Report;
+use super::rights::Rights;
 use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
 use super::vehicle::{Role, Vehicle};
 use super::{Reports, Settings};
@@ -34,6 +36,7 @@ pub(super) struct Runner {
     time: TimeOfDay,
     settings: Settings,
     reports: Reports,
+    rights: Rights,
     vehicle: Vehicle,
     /// The directory that the vehicle and the subscriptions match.
     known: Option<Arc<Directory>>,
@@ -72,7 +75,9 @@ impl Runner {
         outputs: mpsc::Sender<Output>,
     ) -> Self {
         let (sender, received) = mpsc::channel(Self::QUEUE);
+        let subsystem = settings.vehicle.subsystem;
         Self {
+            rights: Rights::new(settings.rules.clone(), component.id(), subsystem),
             vehicle: Vehicle::new(component.id(), settings.vehicle.clone()),
             known: None,
             following: Following::new(component.clone(), sender, settings.rate_hz),
@@ -141,6 +146,10 @@ impl Runner {
                     tracing::warn!("the publisher of cmd_vel is gone: stopping the vehicle");
                 }
             }
+            Input::Unannounced(publisher) => {
+                let why = format!("{publisher} is no publisher of the topic");
+                self.refuse(Counter::Unannounced, &why);
+            }
             Input::Lost { malformed, dropped } => {
                 self.counters.add_many(Counter::Malformed, malformed);
                 self.counters.add_many(Counter::NotTaken, dropped);
@@ -164,8 +173,8 @@ impl Runner {
 
     fn handle_twist(&mut self, now: Instant, command: &Command) {
         self.counters.add(Counter::Velocities);
-        if self.settings.control.is_none() {
-            return self.refuse(Counter::ReadOnly, "allow commands with --control AUTHORITY");
+        if let Err(refusal) = self.rights.check_drive(self.vehicle.drive()) {
+            return self.refuse(Counter::Forbidden, &remedy(refusal));
         }
         self.warn_without_driver();
         let refusal = match self.drive.handle_command(now, command) {
@@ -189,8 +198,8 @@ impl Runner {
 
     fn handle_goal(&mut self, now: Instant, pose: &GoalPose) {
         self.counters.add(Counter::Goals);
-        if self.settings.control.is_none() {
-            return self.refuse(Counter::ReadOnly, "allow commands with --control AUTHORITY");
+        if let Err(refusal) = self.rights.check_goal(self.vehicle.goal()) {
+            return self.refuse(Counter::Forbidden, &remedy(refusal));
         }
         match self.goal(pose) {
             Ok(goal) => {
@@ -215,9 +224,13 @@ impl Runner {
     }
 
     fn handle_emergency(&mut self, now: Instant, on: bool) {
-        if on && !self.settings.allow_emergency && self.settings.control.is_none() {
-            let why = "allow it with --allow-emergency or --control";
-            return self.refuse(Counter::EmergencyRefused, why);
+        let parts = self.vehicle.all(Role::Management);
+        if let Err(refusal) = self.rights.check_emergency(on, parts) {
+            let counter = match on {
+                true => Counter::EmergencyRefused,
+                false => Counter::ClearRefused,
+            };
+            return self.refuse(counter, &remedy(refusal));
         }
         if on {
             self.counters.add(Counter::Emergencies);
@@ -226,9 +239,6 @@ impl Runner {
             }
             self.drive.halt(now);
             self.navigation.cancel(now);
-        } else if !self.settings.allow_clear {
-            let why = "allow it with --allow-clear, or clear the emergency at the operator station";
-            return self.refuse(Counter::ClearRefused, why);
         } else {
             tracing::info!("the emergency is cleared from ROS");
         }
@@ -354,7 +364,9 @@ impl Runner {
         self.steer(now);
         let parts = self.vehicle.all(Role::Management);
         if let Some((on, due)) = self.emergency.poll(now, parts) {
-            for part in due {
+            let rights = &self.rights;
+            let allowed = |part: &JausId| rights.check_emergency_of(on, *part).is_ok();
+            for part in due.into_iter().filter(allowed) {
                 self.jobs.alarm(part, on);
             }
         }
@@ -369,9 +381,10 @@ impl Runner {
         let driver = self.vehicle.drive();
         let wanted = driver.filter(|_| self.drive.wants_control());
         if let Some(peer) = self.drive_lease.want(wanted)
-            && let Some(authority) = self.settings.control
+            && let Some(authority) = self.rights.authority()
         {
-            self.jobs.begin(true, peer, authority);
+            let is_ready = self.rights.may_resume(peer);
+            self.jobs.begin(true, peer, authority, is_ready);
         }
     }
 
@@ -396,9 +409,10 @@ impl Runner {
         let target = self.vehicle.goal();
         let wanted = target.filter(|_| self.navigation.wants_control());
         if let Some(peer) = self.goal_lease.want(wanted)
-            && let Some(authority) = self.settings.control
+            && let Some(authority) = self.rights.authority()
         {
-            self.jobs.begin(false, peer, authority);
+            let is_ready = self.rights.may_resume(peer);
+            self.jobs.begin(false, peer, authority, is_ready);
         }
         if self.navigation.is_superseded() {
             self.jobs.end_order();
@@ -425,7 +439,7 @@ impl Runner {
             return;
         }
         let bridge = BridgeState {
-            authority: self.settings.control,
+            authority: self.rights.authority(),
             drive: self.drive_lease.description(),
             obstacle: self.drive_lease.obstacle(),
             goal: self.navigation.progress().to_string(),
@@ -445,6 +459,11 @@ impl Runner {
         };
         self.counters.add(counter);
     }
+}
+
+/// Why a rule forbids something, with the flag that allows it.
+fn remedy(refusal: Forbidden) -> String {
+    jaus_zenoh::remedy(refusal, "--allow")
 }
 
 impl Drop for Runner {

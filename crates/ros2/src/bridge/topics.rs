@@ -122,29 +122,30 @@ impl Topics {
             true => (&self.types.stamped_twist, "twist."),
             false => (&self.types.twist, ""),
         };
-        let cmd_vel = self.subscription("cmd_vel", twist)?;
-        tasks.spawn(forward(cmd_vel, inputs.clone(), move |received| {
+        let cmd_vel = self.incoming("cmd_vel", twist, inputs)?;
+        tasks.spawn(cmd_vel.forward(move |received, session| {
             // The stamp of a TwistStamped is not checked: with simulated time, it runs at another
             // rate than the clock of the bridge.
             Some(Input::Twist(Command {
                 publisher: received.attachment.gid,
+                session,
                 sequence: received.attachment.sequence,
                 stamp: received.attachment.stamp,
                 arrival: received.arrival,
                 twist: read_twist(&received.message, path).ok()?,
             }))
         }));
-        let goal = self.subscription("goal_pose", &self.types.pose)?;
-        tasks.spawn(forward(goal, inputs.clone(), |received| {
-            Some(Input::Goal(read_goal(&received.message).ok()?))
-        }));
-        let stop = self.subscription("emergency_stop", &self.types.bool)?;
-        tasks.spawn(forward(stop, inputs.clone(), |received| {
+        let goal = self.incoming("goal_pose", &self.types.pose, inputs)?;
+        tasks.spawn(
+            goal.forward(|received, _| Some(Input::Goal(read_goal(&received.message).ok()?))),
+        );
+        let stop = self.incoming("emergency_stop", &self.types.bool, inputs)?;
+        tasks.spawn(stop.forward(|received, _| {
             let on = received.message.get("data").ok()?.as_bool()?;
             Some(Input::EmergencyStop(on))
         }));
-        let release = self.subscription("release", &self.types.empty)?;
-        tasks.spawn(forward(release, inputs.clone(), |_| Some(Input::Release)));
+        let release = self.incoming("release", &self.types.empty, inputs)?;
+        tasks.spawn(release.forward(|_, _| Some(Input::Release)));
         let watch = Watch {
             ros: self.ros.clone(),
             topic: self.topic("cmd_vel"),
@@ -155,13 +156,20 @@ impl Topics {
         Ok(tasks)
     }
 
-    fn subscription(
+    fn incoming(
         &self,
         name: &str,
         interface: &Arc<Interface>,
-    ) -> Result<Subscription, SessionError> {
-        self.node
-            .subscription(&self.topic(name), interface, Qos::default())
+        inputs: &mpsc::Sender<Input>,
+    ) -> Result<Incoming, SessionError> {
+        let topic = self.topic(name);
+        let subscription = self.node.subscription(&topic, interface, Qos::default())?;
+        Ok(Incoming {
+            ros: self.ros.clone(),
+            topic,
+            subscription,
+            inputs: inputs.clone(),
+        })
     }
 
     fn topic(&self, name: &str) -> String {
@@ -244,28 +252,44 @@ impl Drop for Topics {
 /// How often the messages that a subscription has lost are counted.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// Sends the messages of a subscription as inputs, until the bridge ends.
-async fn forward(
-    mut subscription: Subscription,
+/// A topic by which ROS commands the vehicle.
+struct Incoming {
+    ros: Ros,
+    topic: String,
+    subscription: Subscription,
     inputs: mpsc::Sender<Input>,
-    read: impl Fn(&Received) -> Option<Input>,
-) {
-    let mut counted = SubscriptionCounters::default();
-    let mut look = interval(LOOK);
-    loop {
-        let input = tokio::select! {
-            received = subscription.receive() => read(&received).unwrap_or(Input::Lost {
-                malformed: 1,
-                dropped: 0,
-            }),
-            _ = look.tick() => match lost(&mut counted, subscription.counters()) {
-                Some(input) => input,
-                None => continue,
-            },
-        };
-        if inputs.send(input).await.is_err() {
-            return;
+}
+
+impl Incoming {
+    /// Sends the messages as inputs, until the bridge ends. `read` gets the session of the publisher, too.
+    async fn forward(mut self, read: impl Fn(&Received, Gid) -> Option<Input>) {
+        let mut counted = SubscriptionCounters::default();
+        let mut look = interval(LOOK);
+        loop {
+            let input = tokio::select! {
+                received = self.subscription.receive() => self.input(&received, &read),
+                _ = look.tick() => match lost(&mut counted, self.subscription.counters()) {
+                    Some(input) => input,
+                    None => continue,
+                },
+            };
+            if self.inputs.send(input).await.is_err() {
+                return;
+            }
         }
+    }
+
+    /// A message counts only if its publisher has declared its token: whoever invents a gid speaks for nobody.
+    fn input(&self, received: &Received, read: impl Fn(&Received, Gid) -> Option<Input>) -> Input {
+        let gid = received.attachment.gid;
+        let Some(publisher) = self.ros.publisher(&self.topic, gid) else {
+            return Input::Unannounced(gid);
+        };
+        let session = Gid::of_token(&publisher.token.session);
+        read(received, session).unwrap_or(Input::Lost {
+            malformed: 1,
+            dropped: 0,
+        })
     }
 }
 

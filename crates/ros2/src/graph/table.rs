@@ -1,6 +1,7 @@
 //! The known entities.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
 use std::sync::Arc;
 
 use super::{EntityKind, Gid, Token, TokenError};
@@ -9,6 +10,8 @@ use super::{EntityKind, Gid, Token, TokenError};
 const MOST_ENTITIES: usize = 1 << 14;
 /// The most entities that are kept of one topic or service.
 const MOST_OF_TOPIC: usize = 1 << 10;
+/// A session has at most one part in so many of both.
+const SHARE: usize = 4;
 
 /// The entities that exist, by their tokens.
 #[derive(Debug, Default)]
@@ -53,9 +56,21 @@ impl Graph {
     }
 
     fn has_room(&self, token: &Token) -> bool {
-        let of_topic = token.topic().and_then(|name| self.topics.get(name));
-        self.entities.len() < MOST_ENTITIES
-            && of_topic.is_none_or(|keys| keys.len() < MOST_OF_TOPIC)
+        let of_session = token.prefix_of_session();
+        // Keys are in order, so those of a session are together.
+        let later = (Bound::Included(of_session.as_str()), Bound::Unbounded);
+        let is_its_own = |key: &&Arc<str>| key.starts_with(&of_session);
+        let all = self.entities.range::<str, _>(later).map(|(key, _)| key);
+        let all = all.take_while(is_its_own).take(MOST_ENTITIES / SHARE);
+        if self.entities.len() >= MOST_ENTITIES || all.count() >= MOST_ENTITIES / SHARE {
+            return false;
+        }
+        let Some(of_topic) = token.topic().and_then(|name| self.topics.get(name)) else {
+            return true;
+        };
+        let own = of_topic.range::<str, _>(later).take_while(is_its_own);
+        let own = own.take(MOST_OF_TOPIC / SHARE);
+        of_topic.len() < MOST_OF_TOPIC && own.count() < MOST_OF_TOPIC / SHARE
     }
 
     /// Removes the entity of a token that was withdrawn. Returns whether the graph changed.

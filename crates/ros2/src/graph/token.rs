@@ -147,6 +147,11 @@ impl Token {
         }
     }
 
+    /// How the tokens of its session begin.
+    pub(super) fn prefix_of_session(&self) -> String {
+        format!("{ADMIN_SPACE}/{}/{}/", self.domain, self.session)
+    }
+
     /// The name of its topic or service.
     pub(super) fn topic(&self) -> Option<&str> {
         self.endpoint.as_ref().map(|it| it.name.as_str())

@@ -16,30 +16,18 @@ use super::shared::{Entity, Inbox, Incoming, Outgoing, Role, Shared, State};
 use crate::cdr::LONGEST;
 use crate::graph::{Attachment, EntityKind, Gid, History, Qos, Reliability, Token, tokens_key};
 
-/// How long the thread waits between attempts to open the session.
-const RETRY: Duration = Duration::from_secs(1);
 /// How often the thread looks whether the session has a connection.
 const TURN: Duration = Duration::from_secs(1);
 
 /// Runs the session until it is closed.
 pub(super) fn run(shared: &Arc<Shared>, config: &Config) {
-    let mut is_logged = false;
-    while !shared.lock().is_closing {
-        match Running::open(shared.clone(), config.clone()) {
-            Ok(running) => {
-                running.run();
-                break;
-            }
-            Err(error) if !is_logged => {
-                tracing::warn!(%error, "no zenoh network yet: trying again every second");
-                is_logged = true;
-            }
-            Err(error) => tracing::debug!(%error, "no zenoh network yet"),
-        }
+    let open = || Running::open(shared.clone(), config.clone());
+    let wait = |time| {
         let state = shared.lock();
-        if !state.is_closing {
-            drop(shared.wait(state, RETRY));
-        }
+        !state.is_closing && !shared.wait(state, time).is_closing
+    };
+    if let Some(running) = jaus_zenoh::open_session(open, wait) {
+        running.run();
     }
     shared.end();
 }

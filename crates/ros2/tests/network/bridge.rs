@@ -146,9 +146,9 @@ fn python(network: &str, arguments: &[&str]) -> Script {
     Script::start("crates/ros2/tests/network/rover.py", &arguments).ready()
 }
 
-const CONTROL: [&str; 3] = ["--control", "127", "--allow-clear"];
+const CONTROL: [&str; 2] = ["--allow", "control=127 clear-emergency"];
 /// With the longest timeout, so that another reason stops the vehicle first.
-const PATIENT: [&str; 4] = ["--control", "127", "--timeout", "2s"];
+const PATIENT: [&str; 4] = ["--allow", "control=127", "--timeout", "2s"];
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs packages of Python: run .ci/ros2"]
@@ -238,7 +238,7 @@ async fn by_default_python_sees_the_vehicle_and_moves_nothing() {
     let name = "jaus_msgs::msg::dds_::MobilityReportWrenchEffort";
     assert!(line.starts_with(name), "{line}");
     let _pilot = scene.python(&["drive", "1.0", "0.0"]);
-    until(|| scene.says("commands refused because control was not allowed")).await;
+    until(|| scene.says("commands refused by the rights of ROS")).await;
     assert!(scene.speed().abs() < 0.01);
     assert_eq!(scene.rover.controller().await, 0);
     scene.rover.end().await;

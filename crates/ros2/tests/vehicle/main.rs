@@ -98,9 +98,13 @@ async fn without_rights_nothing_is_commanded_and_no_emergency_set() {
     }
     assert!(scene.reported_speed().await.abs() < 0.01);
     assert_eq!(scene.controller().await, 0);
-    scene.until(|it| it.says("--control)=20")).await;
+    scene
+        .until(|it| it.says("rights of ROS (--allow)=20"))
+        .await;
     scene.input(Input::EmergencyStop(true)).await;
-    scene.until(|it| it.says("--allow-emergency)=1")).await;
+    scene
+        .until(|it| it.says("emergency stops refused by the rights of ROS (--allow)=1"))
+        .await;
     tokio::time::sleep(Duration::from_secs(2)).await;
     assert!(!scene.says(": emergency"), "{}", scene.status());
     scene.end().await;
@@ -110,7 +114,7 @@ async fn without_rights_nothing_is_commanded_and_no_emergency_set() {
 async fn a_bridge_that_may_only_stop_sets_an_emergency() {
     let mut scene = Scene::new();
     scene.start_vehicle();
-    scene.start_bridge_with(|settings| settings.allow_emergency = true);
+    scene.start_bridge_with(Some("observe".to_owned()));
     scene.until(|it| it.odometry().is_some()).await;
     scene.input(Input::EmergencyStop(true)).await;
     scene.until(|it| it.says("Driver: emergency")).await;

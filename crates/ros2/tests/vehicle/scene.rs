@@ -67,17 +67,18 @@ impl Scene {
 
     /// Starts a bridge with this authority.
     pub(crate) fn start_bridge(&mut self, authority: Option<u8>) {
-        self.start_bridge_with(|settings| settings.control = authority);
+        self.start_bridge_with(authority.map(|it| format!("control={it} clear-emergency")));
     }
 
-    /// Starts a bridge with these rights.
-    pub(crate) fn start_bridge_with(&mut self, rights: impl FnOnce(&mut Settings)) {
+    /// Starts a bridge with these rights, or without any.
+    pub(crate) fn start_bridge_with(&mut self, rights: Option<String>) {
         let mut settings = Settings::new(Selection {
             subsystem: 101,
             only: Vec::new(),
         });
-        rights(&mut settings);
-        settings.allow_clear = true;
+        if let Some(words) = rights {
+            settings.rules = words.parse().unwrap();
+        }
         settings.rate_hz = 20.0;
         let node = self.node(JausId::new(101, 252, 1));
         let bridge = Component::builder(Kind::Vehicle, "Rover").attach(&node, 1);
@@ -111,6 +112,7 @@ impl Scene {
         let stamp = self.time.now().as_nanos();
         let command = Command {
             publisher: PUBLISHER,
+            session: PUBLISHER,
             sequence: self.sequence.fetch_add(1, Ordering::Relaxed),
             stamp: i64::try_from(stamp).unwrap(),
             arrival: now(),

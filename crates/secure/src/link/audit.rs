@@ -14,6 +14,14 @@ pub(super) fn entry(record: Record) -> Entry {
             Entry::new(who, "disconnect", Outcome::Allowed).because(reason)
         }
         Act::HandshakeFailed(fault) => Entry::new(who, "connect", Outcome::Refused).because(fault),
+        Act::DisputedId {
+            source,
+            destination,
+        } => {
+            let entry = Entry::new(who, "message", Outcome::Refused);
+            let why = "another program with the same key uses this id";
+            entry.id(source).to(destination).because(why)
+        }
         Act::Decided(decision) => Entry::of(who, &decision),
     };
     let entry = match is_stranger {

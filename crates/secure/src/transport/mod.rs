@@ -11,12 +11,14 @@
 //! other side; with it the session begins for both.
 //!
 //! Two nodes that dial each other get two connections. Both sides keep the one that the smaller
-//! public key dialled, or else the newer one.
+//! public key dialled, or else the newer one. Several programs with one key have a session each.
 
 mod admission;
 mod dial;
 mod egress;
+mod fragments;
 mod inlet;
+mod instances;
 mod parameters;
 mod record;
 mod renewal;
@@ -55,6 +57,8 @@ use crate::trust::TrustFile;
 use admission::{Admission, MOST_RESPONSES};
 use dial::Dial;
 use egress::Budget;
+use fragments::Fragments;
+use instances::Instance;
 use session::Session;
 use tokens::Tokens;
 
@@ -74,6 +78,8 @@ mod code {
 #[derive(Debug)]
 pub struct Transport {
     own: PublicKey,
+    /// This program among those with the same key.
+    instance: Instance,
     credentials: Credentials,
     /// What messages need, for the rules of the peers.
     table: Table,
@@ -97,6 +103,8 @@ pub struct Transport {
     handles: HashMap<ConnectionHandle, SessionId>,
     next: u64,
     arrivals: VecDeque<Arrival>,
+    /// The unfinished messages of all sessions.
+    fragments: Fragments,
     /// Answers outside of connections.
     responses: VecDeque<(SocketAddr, Bytes)>,
     /// How many of them were sent since the connections had their turn.
@@ -131,6 +139,7 @@ impl Transport {
         let config = Arc::new(parameters::of_endpoint(&credentials.own_key()));
         Self {
             own,
+            instance: Instance::random(),
             table: Table::default(),
             is_refusing: false,
             edition: credentials.trust_edition(),
@@ -149,6 +158,7 @@ impl Transport {
             handles: HashMap::new(),
             next: 0,
             arrivals: VecDeque::new(),
+            fragments: Fragments::default(),
             responses: VecDeque::new(),
             responded: 0,
             records: VecDeque::new(),
@@ -162,7 +172,9 @@ impl Transport {
     /// Decides by this table what messages need; without it by the catalogue's.
     #[must_use]
     pub fn with_table(self, table: Table) -> Self {
-        Self { table, ..self }
+        let transport = Self { table, ..self };
+        transport.verify_rules();
+        transport
     }
 
     /// Its counters so far.
@@ -204,6 +216,7 @@ impl Transport {
                 if let Some(&id) = self.handles.get(&handle)
                     && let Some(session) = self.sessions.get_mut(&id)
                 {
+                    session.heard_at = Some(now);
                     session.connection.handle_event(event);
                     self.advance(now, id);
                 }
@@ -220,6 +233,7 @@ impl Transport {
         self.apply_own(now);
         self.apply_trust(now);
         self.remind(now);
+        self.settle_instances(now);
         self.dial(now);
         let due: Vec<_> = self
             .sessions
@@ -246,11 +260,13 @@ impl Transport {
 
     /// When to call [`handle_timeout`](Self::handle_timeout) if nothing happens before.
     pub fn poll_timeout(&mut self) -> Option<Instant> {
+        let settlements = self.sessions.values().filter_map(Session::settlement_due);
+        let settlement = settlements.min();
         let sessions = self.sessions.values_mut();
         let sessions = sessions.filter_map(|it| it.connection.poll_timeout());
         let dials = self.dials.iter().filter_map(Dial::due);
         let budget = self.budget.as_ref().and_then(Budget::ready);
-        sessions.chain(dials).chain(budget).min()
+        sessions.chain(dials).chain(budget).chain(settlement).min()
     }
 
     /// Closes all sessions and dials no more; returns whether there is a peer to tell.
@@ -299,7 +315,7 @@ impl Transport {
             };
             match event {
                 // The dialling side waits for the greeting.
-                Event::Connected if session.dial.is_some() => {}
+                Event::Connected if session.dial.is_some() => session.greet(self.instance),
                 Event::Connected => self.establish(now, id),
                 Event::ConnectionLost { reason } => self.lose(now, id, &reason),
                 Event::DatagramReceived => self.read_datagrams(now, id),
@@ -337,10 +353,19 @@ impl Transport {
                 return;
             }
         };
-        let peer = identified.peer;
-        let (key, address) = (peer.key, session.address());
+        let key = identified.peer.key;
+        if session.dial.is_none() && !self.has_place_for(now, key) {
+            self.counters.add(Counter::TooManyInstances);
+            self.end(now, id, code::BUSY, "too many programs with this key");
+            return;
+        }
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let (peer, address) = (identified.peer, session.address());
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
+        session.since = Some(now);
         session.valid_until = identified.valid_until;
         self.counters.add(Counter::SessionsEstablished);
         match session.dial {
@@ -350,41 +375,9 @@ impl Transport {
                     dial.established(id);
                 }
             }
-            None => session.greet(),
+            None => session.greet(self.instance),
         }
         self.record(id, Act::Connected);
-        self.keep_one(now, key, id);
-    }
-
-    /// Leaves one session with a peer; `newer` was established just now.
-    fn keep_one(&mut self, now: Instant, key: PublicKey, newer: SessionId) {
-        let same = |(&id, it): (&SessionId, &Session)| {
-            (id != newer && it.established().is_some_and(|it| it.key == key)).then_some(id)
-        };
-        let Some(older) = self.sessions.iter().find_map(same) else {
-            return;
-        };
-        let we_dialed = |id| {
-            self.sessions
-                .get(&id)
-                .is_some_and(|it: &Session| it.dial.is_some())
-        };
-        let (kept, other) = match (we_dialed(older), we_dialed(newer)) {
-            (one, two) if one == two => (newer, older),
-            (ours, _) if ours == (self.own < key) => (older, newer),
-            _ => (newer, older),
-        };
-        for dial in &mut self.dials {
-            if dial.session == Some(other) {
-                dial.session = Some(kept);
-            }
-        }
-        self.end(
-            now,
-            other,
-            code::DUPLICATE,
-            "another session with the same key",
-        );
     }
 
     /// Handles the loss of a connection.
@@ -444,6 +437,7 @@ impl Transport {
             self.arrivals.push_back(Arrival::Closed(id));
         }
         session.ended = true;
+        self.fragments.forget(id);
         let was_good = session.peer.is_some();
         for dial in &mut self.dials {
             if dial.session == Some(id) {

@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 
+use jaus::address::JausId;
 use jaus::rights::Decision;
 use quinn_proto::ConnectionError;
 
@@ -35,6 +36,13 @@ pub enum Act {
     },
     /// No session was established.
     HandshakeFailed(Fault),
+    /// A message came from an id that another program with the same key uses.
+    DisputedId {
+        /// The id.
+        source: JausId,
+        /// The destination.
+        destination: JausId,
+    },
     /// A rule decided about a message of the peer, or a component about its control.
     Decided(Decision),
 }
@@ -43,7 +51,7 @@ impl Act {
     /// Whether something was refused.
     pub(super) const fn is_refusal(&self) -> bool {
         match self {
-            Self::HandshakeFailed(_) => true,
+            Self::HandshakeFailed(_) | Self::DisputedId { .. } => true,
             Self::Decided(decision) => decision.is_refusal(),
             Self::Connected | Self::Disconnected { .. } => false,
         }

@@ -44,6 +44,9 @@ impl Transport {
         let (edition, wall) = (self.credentials.trust_edition(), self.credentials.now());
         let changed = edition != self.edition;
         self.edition = edition;
+        if changed {
+            self.verify_rules();
+        }
         let mut refused = Vec::new();
         for (&id, session) in &mut self.sessions {
             let expired = session.valid_until.is_some_and(|it| it < wall);
@@ -60,6 +63,13 @@ impl Transport {
         }
         for id in refused {
             self.end(now, id, code::REVOKED, NOT_ACCEPTED);
+        }
+    }
+
+    /// Says if a name in the rules of the peers means nothing.
+    pub(super) fn verify_rules(&self) {
+        if let Err((peer, error)) = self.credentials.trust().verify(&self.table) {
+            tracing::warn!(peer, %error, "rules of a trusted peer");
         }
     }
 

@@ -34,8 +34,14 @@ jaus::counters! {
     /// Messages refused because they came from an id for which the key of their sender may not
     /// speak.
     ForeignIds = "dropped: id that the key of its sender may not use",
+    /// Messages refused because another program with the same key uses their id, and is alive.
+    DisputedIds = "dropped: id that another program with the same key uses",
+    /// Sessions refused because their key had too many.
+    TooManyInstances = "sessions refused: too many programs with one key",
     /// Messages refused by the [rules](jaus::rights::Rules) of the key of their sender.
     RuleForbids = "dropped: forbidden by the rules of its sender",
+    /// Fragments that continue no message which their session began, and which its rules allow.
+    StrayFragments = "dropped: fragment of a message that its session did not begin",
     Malformed = "dropped: not JUDP",
     /// Messages not sent to a peer because the rules separate it from their source.
     Separated = "not sent: rules separate source and peer",

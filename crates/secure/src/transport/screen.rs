@@ -12,6 +12,8 @@ use crate::trust::Peer;
 pub(super) struct Screened {
     /// The datagram as it was if all frames pass; without the others if some do; `None` if none.
     pub(super) passed: Option<Bytes>,
+    /// Frames that pass to a part of the ids that they are for: a datagram for each.
+    pub(super) narrowed: Vec<Bytes>,
     pub(super) frames: Vec<(Frame, Result<(), Unaccepted>)>,
 }
 
@@ -22,23 +24,29 @@ pub(super) fn incoming(
     (table, can_record): (&Table, bool),
     octets: &Bytes,
 ) -> Option<Screened> {
-    screen(octets, |frame| {
+    let mut narrowed = Vec::new();
+    let mut screened = screen(octets, |frame| {
         if !peer.speaks_for(frame.source) {
             return Err(Unaccepted::Source);
         }
-        let checked = peer.rules.check(frame, table);
-        let checked = checked.and_then(|()| match can_record {
-            true => Ok(()),
-            false => check_unrecorded(frame, table),
-        });
-        checked.map_err(Unaccepted::Rule)
-    })
+        let admitted = peer.rules.admit(frame, table).map_err(Unaccepted::Rule)?;
+        if !can_record {
+            check_unrecorded(frame, table).map_err(Unaccepted::Rule)?;
+        }
+        let copies = admitted.copies(frame);
+        let passes_whole = copies.is_none();
+        narrowed.extend(copies.into_iter().flatten());
+        Ok(passes_whole)
+    })?;
+    let datagrams = narrowed.iter().filter_map(|copy| judp::encode(copy).ok());
+    screened.narrowed = datagrams.collect();
+    Some(screened)
 }
 
-/// Screens a datagram with this check; `None` if it is no JUDP.
+/// Screens a datagram with this check, which says whether a frame passes as it is; `None` if it is no JUDP.
 pub(super) fn screen(
     octets: &Bytes,
-    check: impl Fn(&Frame) -> Result<(), Unaccepted>,
+    mut check: impl FnMut(&Frame) -> Result<bool, Unaccepted>,
 ) -> Option<Screened> {
     let mut following = judp::frames(octets.clone()).ok()?;
     let first = octets.len() - following.remaining();
@@ -47,10 +55,10 @@ pub(super) fn screen(
     while let Some(Ok(frame)) = following.next() {
         let end = octets.len() - following.remaining();
         let decision = check(&frame);
-        if decision.is_ok() {
+        if decision == Ok(true) {
             kept.push(begin..end);
         }
-        frames.push((frame, decision));
+        frames.push((frame, decision.map(drop)));
         begin = end;
     }
     let passed = if kept.len() == frames.len() {
@@ -65,7 +73,12 @@ pub(super) fn screen(
         }
         Some(passed.freeze())
     };
-    Some(Screened { passed, frames })
+    let narrowed = Vec::new();
+    Some(Screened {
+        passed,
+        narrowed,
+        frames,
+    })
 }
 
 /// Whether a path between two peers is open: neither may be closed to the other.

@@ -16,6 +16,7 @@ use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId
 use rustls::pki_types::{CertificateDer, UnixTime};
 
 use super::inlet::{Inlet, framed};
+use super::instances::{Instance, UsedIds};
 use super::zone;
 use crate::authority::Rejection;
 use crate::credentials::Identified;
@@ -39,6 +40,16 @@ pub(super) struct Session {
     pub(super) dial: Option<usize>,
     /// The peer, after the handshake.
     pub(super) peer: Option<Peer>,
+    /// Since when it is known.
+    pub(super) since: Option<Instant>,
+    /// Which of the programs with its key it is, once it has told.
+    pub(super) instance: Option<Instance>,
+    /// The ids that it uses.
+    pub(super) used: UsedIds,
+    /// When the latest packet came.
+    pub(super) heard_at: Option<Instant>,
+    /// When it was asked for a sign of life, until that is settled.
+    pub(super) asked: Option<Instant>,
     /// Until when its certificate is valid, if it has one.
     pub(super) valid_until: Option<UnixTime>,
     /// Whether it has ended and only waits for late packets of the peer.
@@ -75,6 +86,11 @@ impl Session {
             connection,
             dial,
             peer: None,
+            since: None,
+            instance: None,
+            used: UsedIds::default(),
+            heard_at: None,
+            asked: None,
             valid_until: None,
             ended: false,
             noticed: None,
@@ -131,10 +147,18 @@ impl Session {
             .push(priority, datagram.len(), (priority, datagram))
     }
 
-    /// Tells the peer that dialled that it is trusted: an empty datagram on a stream. TLS lets the
-    /// dialling side finish its handshake before the other side has checked its key.
-    pub(super) fn greet(&mut self) {
-        self.write(usize::from(Priority::Standard.bits()), &[]);
+    /// Tells the peer which program this is; and before, if the peer has dialled, that it is trusted: by
+    /// an empty datagram on a stream. TLS lets the dialling side finish its handshake before the other
+    /// side has checked its key.
+    pub(super) fn greet(&mut self, own: Instance) {
+        let level = usize::from(Priority::Standard.bits());
+        if self.dial.is_none() {
+            self.write(level, &[]);
+        }
+        if let Some(hello) = own.hello() {
+            // The first octets of a stream are never held up.
+            self.write(level, &hello);
+        }
     }
 
     /// The priority of the datagram that waits next.

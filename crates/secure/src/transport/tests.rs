@@ -7,6 +7,7 @@
 mod beacons;
 mod budget;
 mod floods;
+mod instances;
 
 use std::collections::BTreeMap;
 
@@ -169,13 +170,17 @@ fn judp(source: &str, octets: usize) -> Bytes {
 }
 
 /// A fragment of a large message, which has to arrive.
+/// A fragment of a message that begins with the number 0.
 fn fragment(source: &str, number: u16) -> Bytes {
     let mut frame = Frame::new(
         source.parse().unwrap(),
         JausId::EVERYONE,
         vec![7; 1400].into(),
     );
-    frame.flags = Flags::default().with_data(DataControl::Middle);
+    frame.flags = Flags::default().with_data(match number {
+        0 => DataControl::First,
+        _ => DataControl::Middle,
+    });
     frame.sequence = number;
     judp::encode(&frame).unwrap()
 }

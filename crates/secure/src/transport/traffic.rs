@@ -6,9 +6,10 @@ use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
 use jaus::rights::{Decision, Unaccepted, denial};
-use jaus::wire::{Frame, Priority, judp};
+use jaus::wire::{DataControl, Frame, Priority, judp};
 use quinn_proto::StreamId;
 
+use super::instances::HELLO;
 use super::record::{Act, Record};
 use super::screen;
 use super::session::Session;
@@ -68,7 +69,7 @@ impl Transport {
                 screen::may_pass(frame.source, &origins, to)
             };
             let passes = is_addressed && (!has_limits || is_open());
-            passes.then_some(()).ok_or(Unaccepted::Source)
+            passes.then_some(true).ok_or(Unaccepted::Source)
         })?;
         let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
         self.counters.add_many(Counter::Separated, stopped as u64);
@@ -135,7 +136,20 @@ impl Transport {
             self.counters.add(Counter::NoticesReceived);
             return;
         }
-        let Some(screened) = screen::incoming(peer, (&self.table, !self.is_refusing), octets)
+        if octets.first() == Some(&HELLO) {
+            self.handle_hello(now, id, octets);
+            return;
+        }
+        let Some(octets) = self.undisputed(now, id, octets) else {
+            return;
+        };
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let Some(peer) = session.established() else {
+            return;
+        };
+        let Some(screened) = screen::incoming(peer, (&self.table, !self.is_refusing), &octets)
         else {
             self.counters.add(Counter::Malformed);
             return;
@@ -144,11 +158,29 @@ impl Transport {
         for (frame, checked) in &screened.frames {
             self.handle_decision(now, id, frame, *checked);
         }
-        if let Some(octets) = screened.passed {
+        let is_part = |frame: &Frame| frame.flags.data() != DataControl::Single;
+        let has_parts = screened.frames.iter().any(|(frame, _)| is_part(frame));
+        let passed = match screened.passed {
+            Some(datagram) if has_parts => self.continued(id, &datagram),
+            passed => passed,
+        };
+        for octets in passed.into_iter().chain(screened.narrowed) {
             let session = id;
             self.arrivals
                 .push_back(Arrival::Datagram { session, octets });
         }
+    }
+
+    /// A datagram without later fragments that continue no message of this session.
+    fn continued(&mut self, id: SessionId, datagram: &Bytes) -> Option<Bytes> {
+        let mut stopped = 0;
+        let screened = screen::screen(datagram, |frame| {
+            let passes = self.fragments.admit(id, frame);
+            stopped += u64::from(!passes);
+            Ok(passes)
+        })?;
+        self.counters.add_many(Counter::StrayFragments, stopped);
+        screened.passed
     }
 
     /// Records the decision on a frame of the peer; of a refused one, tells the peer.
@@ -168,7 +200,7 @@ impl Transport {
             Err(Unaccepted::Source) => self.counters.add(Counter::ForeignIds),
             Err(Unaccepted::Rule(_)) => {
                 self.counters.add(Counter::RuleForbids);
-                self.answer_refusal(now, id, frame, &decision);
+                self.answer_refusal(now, id, frame, &decision.to_string());
             }
         }
         self.record(id, Act::Decided(decision));
@@ -176,7 +208,13 @@ impl Transport {
 
     /// Tells the peer what was refused: in the words of JAUS if it asked for control, and in a
     /// notice.
-    fn answer_refusal(&mut self, now: Instant, id: SessionId, frame: &Frame, decision: &Decision) {
+    pub(super) fn answer_refusal(
+        &mut self,
+        now: Instant,
+        id: SessionId,
+        frame: &Frame,
+        sentence: &str,
+    ) {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
@@ -189,8 +227,7 @@ impl Transport {
         if session.noticed.is_none_or(|at| now >= at + NOTICE_PAUSE) {
             session.noticed = Some(now);
             let name = session.established().map_or("", |it| &it.name);
-            tracing::warn!(peer = name, "refused {decision}");
-            let sentence = decision.to_string();
+            tracing::warn!(peer = name, "refused {sentence}");
             let mut notice = BytesMut::new();
             notice.put_u8(NOTICE);
             notice.put_slice(&sentence.as_bytes()[..sentence.len().min(LONGEST_NOTICE)]);

@@ -61,6 +61,9 @@ fn check(path: &Path, file: &File, readers: Readers) -> io::Result<()> {
     let denied = |text: String| Err(io::Error::new(io::ErrorKind::PermissionDenied, text));
     let mode = file.metadata()?.mode() & 0o777;
     let excess = mode & 0o066 & !readers.mode();
+    if excess & 0o004 == 0 && is_credential(path, std::env::var_os("CREDENTIALS_DIRECTORY")) {
+        return Ok(());
+    }
     let name = path.display();
     if excess & 0o044 != 0 {
         return denied(format!(
@@ -94,6 +97,20 @@ fn check(path: &Path, file: &File, readers: Readers) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether systemd has put the file into the folder of this service's credentials. There an access control
+/// list lets the service's user alone read it, and the mode shows its mask as the rights of the group.
+#[cfg(unix)]
+fn is_credential(path: &Path, folder: Option<std::ffi::OsString>) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+
+    let Some(folder) = folder.filter(|it| path.parent() == Some(Path::new(it))) else {
+        return false;
+    };
+    let is_guarded = |it: std::fs::Metadata| it.uid() == 0 && it.mode() & 0o022 == 0;
+    let plain = path.symlink_metadata().ok().filter(|it| it.is_file());
+    plain.is_some_and(is_guarded) && Path::new(&folder).metadata().is_ok_and(is_guarded)
 }
 
 #[cfg(not(unix))]
@@ -145,6 +162,31 @@ mod tests {
             set_mode(&path, mode);
             assert_eq!(read(&path, readers, 100).unwrap(), b"content");
         }
+    }
+
+    #[test]
+    fn a_credential_of_systemd_may_show_the_mask_of_its_list_as_rights_of_the_group() {
+        use std::os::unix::fs::chown;
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        fs::write(&path, "content").unwrap();
+        let credentials = || Some(folder.path().as_os_str().to_owned());
+        set_mode(&path, 0o440);
+        if chown(&path, Some(0), Some(0)).is_err() {
+            return println!("NOT TESTED: only root can make a file of root");
+        }
+        assert!(is_credential(&path, credentials()));
+        assert!(!is_credential(&path, None), "not a service");
+        assert!(!is_credential(&path, Some("/run/credentials/other".into())));
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        assert!(!is_credential(&link, credentials()));
+        set_mode(&path, 0o460);
+        assert!(!is_credential(&path, credentials()));
+        set_mode(&path, 0o440);
+        chown(&path, Some(4711), None).unwrap();
+        assert!(!is_credential(&path, credentials()), "another user's");
     }
 
     #[test]

@@ -75,10 +75,15 @@ fn samples(now: Instant, from: &mut Exchange) -> Vec<Publication> {
         .collect()
 }
 
-/// Passes all samples of one bridge to another.
+/// Passes all samples and tokens of one bridge to another.
 fn pass(now: Instant, from: &mut Exchange, to: &mut Exchange) {
-    for sample in samples(now, from) {
-        to.handle_sample(now, &sample.key, &sample.payload);
+    while let Some(command) = from.poll_command(now) {
+        match command {
+            Command::Announce(id) => to.handle_token(now, &from.token_key(id), true),
+            Command::Withdraw(id) => to.handle_token(now, &from.token_key(id), false),
+            Command::Publish(sample) => to.handle_sample(now, &sample.key, &sample.payload),
+            Command::Serve(_) | Command::Identify(_) => {}
+        }
     }
 }
 
@@ -97,7 +102,12 @@ fn session_of(bridge: &mut Exchange) -> SessionId {
 
 /// The bridge `THERE` announces a component.
 fn announce(now: Instant, to: &mut Exchange, component: JausId) {
-    to.handle_token(now, &bridge(THERE, &[]).token_key(component), true);
+    announce_by(THERE, now, to, component);
+}
+
+/// A bridge announces a component.
+fn announce_by(from: BridgeId, now: Instant, to: &mut Exchange, component: JausId) {
+    to.handle_token(now, &bridge(from, &[]).token_key(component), true);
 }
 
 #[test]
@@ -217,6 +227,9 @@ fn three_bridges_on_two_networks_make_no_loop() {
     let mut bridges = [bridge(HERE, &[]), bridge(THERE, &[]), bridge(third, &[])];
     let call = frame(OPERATOR, JausId::EVERYONE, b"\x00\x2B\x02");
     bridges[0].transmit(now, &to_group(std::slice::from_ref(&call)));
+    for other in &mut bridges[1..] {
+        announce_by(HERE, now, other, OPERATOR);
+    }
     for sample in samples(now, &mut bridges[0]) {
         for other in &mut bridges[1..] {
             other.handle_sample(now, &sample.key, &sample.payload);
@@ -242,7 +255,8 @@ fn a_message_that_returns_to_its_own_side_is_refused() {
     there.transmit(now, &to_group(std::slice::from_ref(&call)));
     pass(now, &mut there, &mut here);
     assert!(arrivals(&mut here).is_empty());
-    assert_eq!(here.counters().get(Counter::OwnId), 1);
+    let refused = here.counters().get(Counter::OwnId);
+    assert_eq!(refused, 2, "the token and the message");
 }
 
 #[test]

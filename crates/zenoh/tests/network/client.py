@@ -3,7 +3,8 @@
 client.py ENDPOINT get SELECTOR          prints the values, one a line
 client.py ENDPOINT subscribe KEY COUNT   prints so many values, and `subscribed` before them
 client.py ENDPOINT tokens KEY            prints the keys of liveliness tokens
-client.py ENDPOINT put KEY HEX           publishes octets
+client.py ENDPOINT put KEY HEX [TOKEN]   publishes octets, and declares a token before
+client.py ENDPOINT token KEY             declares a token, prints the id of its session, and stays
 """
 
 import json
@@ -13,7 +14,7 @@ import time
 import zenoh
 
 
-def main(endpoint, action, key, argument=None):
+def main(endpoint, action, key, argument=None, token=None):
     config = zenoh.Config()
     config.insert_json5("mode", json.dumps("client"))
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -33,9 +34,16 @@ def main(endpoint, action, key, argument=None):
             for reply in session.liveliness().get(key, timeout=20):
                 if reply.ok:
                     print(reply.ok.key_expr, flush=True)
+        elif action == "token":
+            declared = session.liveliness().declare_token(key)
+            print(session.zid(), flush=True)
+            time.sleep(120)
+            declared.undeclare()
         elif action == "put":
+            declared = token and session.liveliness().declare_token(token)
             session.put(key, bytes.fromhex(argument))
             time.sleep(0.2)
+            del declared
 
 
 main(*sys.argv[1:])

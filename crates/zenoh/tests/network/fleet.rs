@@ -40,6 +40,7 @@ fn node(subsystem: u16, accept: &[&str], routers: &[String], first: usize) -> No
     let mut settings = Settings::default();
     if !accept.is_empty() {
         settings.accept = Acceptance::new(accept.iter().map(|it| it.parse().unwrap()));
+        settings.trusts_network = true;
     }
     let mut bridge = Bridge::new(settings, &network).unwrap();
     let mut config = Config::new(subsystem, 1).without_udp();

@@ -16,6 +16,8 @@ config = zenoh.Config.from_file(flags.config) if flags.config else zenoh.Config(
 config.insert_json5("mode", json.dumps("router"))
 config.insert_json5("listen/endpoints", json.dumps([flags.listen]))
 config.insert_json5("connect/endpoints", json.dumps(flags.connect))
+# As in zenohd.
+config.insert_json5("adminspace/enabled", "true")
 if flags.no_multicast_scouting:
     config.insert_json5("scouting/multicast/enabled", "false")
 with zenoh.open(config):

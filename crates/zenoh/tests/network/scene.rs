@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jaus::address::JausId;
@@ -129,6 +130,19 @@ impl Client {
     }
 }
 
+/// The lines that a program has logged.
+#[derive(Clone, Default)]
+pub(crate) struct Log(Arc<Mutex<Vec<String>>>);
+
+impl Log {
+    /// How many lines have all of these texts.
+    pub(crate) fn count(&self, texts: &[&str]) -> usize {
+        let lines = self.0.lock().unwrap();
+        let has_all = |line: &&String| texts.iter().all(|text| line.contains(text));
+        lines.iter().filter(has_all).count()
+    }
+}
+
 /// One JAUS system: its multicast group on loopback.
 pub(crate) struct System {
     group: Group,
@@ -147,13 +161,30 @@ impl System {
 
     /// Starts a bridge of this system.
     pub(crate) fn bridge(&self, id: &str, flags: &[&str]) -> Process {
-        let child = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"))
+        Process(self.program(id, flags).spawn().unwrap())
+    }
+
+    /// Starts a bridge of this system whose log is read.
+    pub(crate) fn bridge_with_log(&self, id: &str, flags: &[&str]) -> (Process, Log) {
+        let mut program = self.program(id, flags);
+        let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
+        let log = Log::default();
+        let (lines, kept) = (BufReader::new(child.stderr.take().unwrap()), log.clone());
+        std::thread::spawn(move || {
+            for line in lines.lines().map_while(Result::ok) {
+                kept.0.lock().unwrap().push(line);
+            }
+        });
+        (Process(child), log)
+    }
+
+    fn program(&self, id: &str, flags: &[&str]) -> Command {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"));
+        program
             .args(["--loopback", "--port", "0", "--id", id])
             .args(["--group", &self.group.to_string()])
-            .args(flags)
-            .spawn()
-            .unwrap();
-        Process(child)
+            .args(flags);
+        program
     }
 }
 

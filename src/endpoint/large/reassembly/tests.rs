@@ -10,6 +10,19 @@ const US: JausId = JausId::new(101, 1, 1);
 const PEER: JausId = JausId::new(42, 1, 1);
 const SECOND: Duration = Duration::from_secs(1);
 
+const LINE: Path = Path {
+    link: LinkId(0),
+    peer: Remote::Line,
+};
+
+/// A secure session of the same link.
+const fn session(number: u64) -> Path {
+    Path {
+        link: LinkId(0),
+        peer: Remote::Session(SessionId(number)),
+    }
+}
+
 use DataControl::{First, Last, Middle};
 
 fn flags(data: DataControl) -> Flags {
@@ -54,10 +67,10 @@ impl Rig {
 
     /// Adds a fragment; returns the payload of the message if it is complete.
     fn insert(&mut self, frame: &Frame) -> Result<Option<Bytes>, Counter> {
-        let path = Path {
-            link: LinkId(0),
-            peer: Remote::Line,
-        };
+        self.insert_by(LINE, frame)
+    }
+
+    fn insert_by(&mut self, path: Path, frame: &Frame) -> Result<Option<Bytes>, Counter> {
         let arrival = Arrival {
             frame,
             now: self.now,
@@ -76,6 +89,32 @@ impl Rig {
     fn pass(&mut self, time: Duration) {
         self.now += time;
         self.reassembly.expire(self.now, &mut self.counters);
+    }
+}
+
+#[test]
+fn fragments_of_one_session_complete_no_message_of_another() {
+    let paths = [session(1), session(2), LINE];
+    for (one, other) in paths
+        .iter()
+        .flat_map(|one| paths.map(|other| (*one, other)))
+    {
+        let mut rig = Rig::new();
+        let parts = [(First, 1), (Middle, 2), (Last, 3)];
+        let [first, middle, last] =
+            parts.map(|(data, number)| fragment(flags(data), number, &[number as u8; 3]));
+        assert_eq!(rig.insert_by(one, &first), Ok(None));
+        let joins = one == other;
+        assert_eq!(rig.reassembly.awaits(&middle, other), joins);
+        assert_eq!(rig.insert_by(other, &middle), Ok(None));
+        let whole = rig.insert_by(other, &last).unwrap();
+        assert_eq!(whole.is_some(), joins, "{one:?} {other:?}");
+        // The message of the first session is still complete with its own fragments.
+        if !joins {
+            assert_eq!(rig.insert_by(one, &last), Ok(None));
+            let whole = rig.insert_by(one, &middle).unwrap();
+            assert_eq!(whole.as_deref(), Some(&[1, 1, 1, 2, 2, 2, 3, 3, 3][..]));
+        }
     }
 }
 
@@ -204,7 +243,7 @@ fn a_run_is_stale_when_its_sender_has_used_16384_numbers() {
         rig.insert(&other).unwrap();
         rig.reassembly.change(PEER, |sender| sender.latest = 2);
         let next = fragment(flags(Middle), 2, b"bb");
-        assert_eq!(rig.reassembly.awaits(&next), joins, "{ahead}");
+        assert_eq!(rig.reassembly.awaits(&next, LINE), joins, "{ahead}");
         rig.insert(&next).unwrap();
         let runs = &rig.reassembly.senders[&PEER].runs;
         assert_eq!(runs.len(), if joins { 2 } else { 3 }, "{ahead}");
@@ -247,12 +286,16 @@ fn a_fragment_is_awaited_next_after_a_beginning() {
     ] {
         let mut rig = Rig::new();
         rig.insert(&fragment(known, 7, b"aa")).unwrap();
-        assert_eq!(rig.reassembly.awaits(&next), expected, "{known:?} {next:?}");
+        assert_eq!(
+            rig.reassembly.awaits(&next, LINE),
+            expected,
+            "{known:?} {next:?}"
+        );
         let stranger = Frame {
             source: JausId::new(42, 1, 2),
             ..next
         };
-        assert!(!rig.reassembly.awaits(&stranger));
+        assert!(!rig.reassembly.awaits(&stranger, LINE));
     }
 }
 
@@ -284,7 +327,9 @@ fn a_sender_has_at_most_1024_runs() {
         (1, 1024)
     );
     assert!(
-        !rig.reassembly.senders[&PEER].runs.contains_key(&(US, 0)),
+        !rig.reassembly.senders[&PEER]
+            .runs
+            .contains_key(&((US, None), 0)),
         "the oldest"
     );
 }
@@ -362,7 +407,8 @@ fn the_next_whole_message_ends_one_of_full_fragments_whose_last_has_its_number()
         let mut rig = Rig::new();
         rig.insert(&fragment(flags(data), 1, &full)).unwrap();
         rig.insert(&fragment(flags(Middle), 2, second)).unwrap();
-        let whole = rig.reassembly.finish(PEER, number);
+        let next = fragment(flags(DataControl::Single), number, short);
+        let whole = rig.reassembly.finish(&next, LINE);
         assert_eq!(whole.is_some(), ends, "{data:?} {number}");
         assert_eq!(rig.reassembly.cost() == 0, ends);
     }

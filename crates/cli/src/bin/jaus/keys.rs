@@ -14,10 +14,12 @@ use jaus::rights::Rules;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::folders::make_folder_of;
 use jaus_cli::output::{Output, say};
+use jaus_cli::permissions::table_with;
 use jaus_cli::secure::KeyFiles;
 use jaus_secure::{Grant, Key, Peer, PublicKey, Trust, edit};
 use serde_json::json;
 
+use crate::definitions::Jsidl;
 use crate::uptake::with_uptake;
 
 /// Make the key of this host's node, and choose the keys that it trusts
@@ -134,11 +136,17 @@ struct RuleWords {
     /// definition has
     #[arg(value_name = "RULE")]
     rules: Vec<String>,
+
+    #[command(flatten)]
+    jsidl: Jsidl,
 }
 
 impl RuleWords {
     fn rules(&self) -> Result<Rules, Failure> {
-        self.rules.join(" ").parse().map_err(Failure::of)
+        let rules: Rules = self.rules.join(" ").parse().map_err(Failure::of)?;
+        let table = table_with(self.jsidl.paths())?;
+        rules.verify(&table).map_err(Failure::of)?;
+        Ok(rules)
     }
 }
 

@@ -192,6 +192,7 @@ pub(crate) fn introduce(
     component: &Component,
     printer: &mut EventPrinter,
 ) -> Result<(), Failure> {
+    network::tell_exposure(node);
     let Some(output) = printer.output() else {
         let link = |it: &LinkReport| {
             json!({
@@ -216,9 +217,6 @@ pub(crate) fn introduce(
             "on {}: UDP {}, {group}",
             link.interface.name, link.local
         ))?;
-    }
-    if network::is_exposed(node) {
-        output.line(network::EXPOSED)?;
     }
     if let Some(tcp) = node.tcp() {
         let listening = tcp.listening.map_or_else(

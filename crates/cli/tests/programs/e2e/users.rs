@@ -116,7 +116,10 @@ fn leaves(page: &mut Browser) {
 }
 
 fn says_who_did_what(audit: &Path) {
-    let log = std::fs::read_to_string(audit).unwrap();
+    let files = [audit, &jaus_audit::refusals_of(audit)];
+    let log = files
+        .map(|file| std::fs::read_to_string(file).unwrap())
+        .concat();
     for words in [
         ["ben", "take control", "allowed"],
         ["ben", "session ended", "ended by anna"],

@@ -65,7 +65,12 @@ impl Source {
             let (attrs, shape) = match item {
                 Item::Struct(item) if item.ident == name => {
                     let fields = match &item.fields {
-                        Fields::Named(fields) => fields.named.iter().map(Field::new).collect(),
+                        Fields::Named(fields) => {
+                            let fields = fields.named.iter().map(Field::new);
+                            // Programs set the others.
+                            let is_read = |it: &Field| !it.attributes.contains("(skip)");
+                            fields.filter(is_read).collect()
+                        }
                         _ => return Some(Definition::text(&item.attrs)),
                     };
                     (&item.attrs, Shape::Table(fields))

@@ -1,9 +1,12 @@
 //! What a key may do, and what one peer learns of another.
 
 use jaus::codec::Message as _;
-use jaus::messages::core::{ConfirmControl, RejectControl, RequestControl, SetEmergency};
+use jaus::messages::core::{
+    ConfirmControl, QueryIdentification, RejectControl, RequestControl, SetEmergency,
+};
 use jaus::messages::mobility::{QueryVelocityState, SetWrenchEffort};
 use jaus::rights::{Decision, Refusal, Unaccepted, Verdict};
+use jaus::wire::{DataControl, Flags};
 
 use super::*;
 
@@ -203,8 +206,8 @@ fn pass_on(network: &mut Network) {
 #[test]
 fn a_relay_separates_vehicles_and_operators_by_its_rules() {
     let mut network = relay();
-    let heartbeat = message("101.1.1", "65535.255.255", &SetEmergency::default());
-    let hello = message("61.1.1", "65535.255.255", &SetEmergency::default());
+    let heartbeat = message("101.1.1", "65535.255.255", &QueryIdentification::default());
+    let hello = message("61.1.1", "65535.255.255", &QueryIdentification::default());
     network.send(1, Priority::Standard, &heartbeat);
     network.send(3, Priority::Standard, &hello);
     network.send(
@@ -227,6 +230,67 @@ fn a_relay_separates_vehicles_and_operators_by_its_rules() {
         1,
         "Anna's message to the truck"
     );
+}
+
+#[test]
+fn a_stop_for_all_reaches_those_that_its_sender_may_reach_and_no_others() {
+    let mut network = relay();
+    let stop = SetEmergency::default();
+    network.send(
+        3,
+        Priority::Standard,
+        &message("61.1.1", "65535.255.255", &stop),
+    );
+    pass_on(&mut network);
+    let own = message("61.1.1", "101.255.255", &stop);
+    assert_eq!(network.hosts[1].received, [own]);
+    for host in 2..=4 {
+        assert!(network.hosts[host].received.is_empty(), "{host}");
+    }
+    assert_eq!(network.count(0, Counter::RuleForbids), 0);
+}
+
+/// A fragment of a Set Wrench Effort from 60.1.1 to 101.1.1.
+fn fragment(data: DataControl, sequence: u16) -> Bytes {
+    let (source, destination) = (JausId::new(60, 1, 1), JausId::new(101, 1, 1));
+    let frame = Frame {
+        flags: Flags::default().with_data(data),
+        sequence,
+        ..Frame::new(source, destination, Bytes::from_static(b"\x05\x04\0\0"))
+    };
+    judp::encode(&frame).unwrap()
+}
+
+#[test]
+fn fragments_of_one_key_complete_no_message_of_another() {
+    use DataControl::{First, Last, Middle};
+    let keys: [Key; 3] = std::array::from_fn(|_| key());
+    let rules = |rules: &str, name, key| Peer {
+        rules: rules.parse().unwrap(),
+        ..peer(name, key, "60.255.255")
+    };
+    let peers = [
+        rules("command", "operator", &keys[1]),
+        rules("", "viewer", &keys[2]),
+    ];
+    let mut network = Network::new();
+    network.add(&keys[0], &trusting(peers), &[]);
+    for key in &keys[1..] {
+        let vehicle = peer("vehicle", &keys[0], "101.255.255");
+        network.add(key, &trusting([vehicle]), &[address(1)]);
+    }
+    network.run(SECOND);
+    let mut send = |host, data, number| {
+        network.send(host, Priority::Standard, &fragment(data, number));
+        network.run(SECOND);
+        network.hosts[0].received.len()
+    };
+    assert_eq!(send(1, First, 1), 1);
+    assert_eq!(send(2, Middle, 2), 1, "the viewer continues the command");
+    assert_eq!(send(2, Last, 2), 1, "the viewer ends the command");
+    assert_eq!(send(1, Middle, 2), 2);
+    assert_eq!(send(1, Last, 3), 3);
+    assert_eq!(network.count(0, Counter::StrayFragments), 2);
 }
 
 #[test]

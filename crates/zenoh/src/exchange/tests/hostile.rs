@@ -3,6 +3,11 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::arrivals::MOST_OF_SESSION;
+
+const SET_EMERGENCY: &[u8] = b"\x06\x00\x01\x00";
+/// Asks the client in control to hand it over, with authority 255.
+const REQUEST_HANDOFF: &[u8] = b"\x31\xFF\xFF\x01x";
 
 /// A sample as another bridge publishes it.
 fn sample(frame: &Frame, from: BridgeId) -> (String, Bytes) {
@@ -20,12 +25,19 @@ fn sample(frame: &Frame, from: BridgeId) -> (String, Bytes) {
 fn by_default_the_other_side_observes_and_its_commands_are_refused() {
     let now = Instant::now();
     let mut vehicle = bridge(THERE, &[]);
-    for (payload, passes) in [(QUERY, true), (RESUME, false)] {
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
+    for (payload, passes) in [
+        (QUERY, true),
+        (RESUME, false),
+        (REQUEST_CONTROL, false),
+        (REQUEST_HANDOFF, false),
+        (SET_EMERGENCY, false),
+    ] {
         let (key, octets) = sample(&frame(OPERATOR, DRIVER, payload), HERE);
         vehicle.handle_sample(now, &key, &octets);
         assert_eq!(arrivals(&mut vehicle).len(), usize::from(passes));
     }
-    assert_eq!(vehicle.counters().get(Counter::RuleForbids), 1);
+    assert_eq!(vehicle.counters().get(Counter::RuleForbids), 4);
 }
 
 #[test]
@@ -33,6 +45,7 @@ fn a_refused_request_for_control_is_answered_as_by_the_component() {
     let now = Instant::now();
     let mut vehicle = bridge(THERE, &[]);
     vehicle.handle_local(now, DRIVER, now);
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
     samples(now, &mut vehicle);
     let (key, octets) = sample(&frame(OPERATOR, DRIVER, REQUEST_CONTROL), HERE);
     vehicle.handle_sample(now, &key, &octets);
@@ -53,6 +66,7 @@ fn a_refused_request_for_control_is_answered_as_by_the_component() {
 fn with_the_right_commands_and_control_pass_up_to_its_authority() {
     let now = Instant::now();
     let mut vehicle = bridge(THERE, &["60 control=100"]);
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
     let too_much: &[u8] = b"\x0D\x00\x65";
     for (payload, passes) in [(RESUME, true), (REQUEST_CONTROL, true), (too_much, false)] {
         let (key, octets) = sample(&frame(OPERATOR, DRIVER, payload), HERE);
@@ -97,6 +111,63 @@ fn nobody_speaks_for_a_component_of_this_side_or_of_another_bridge() {
     vehicle.handle_sample(now, &key, &octets);
     assert_eq!(vehicle.counters().get(Counter::OtherBridge), 1);
     assert!(arrivals(&mut vehicle).is_empty());
+}
+
+/// The tokens about which the network is asked; other commands are dropped.
+fn identified(now: Instant, by: &mut Exchange) -> Vec<String> {
+    std::iter::from_fn(|| by.poll_command(now))
+        .filter_map(|command| match command {
+            Command::Identify(token) => Some(token),
+            _ => None,
+        })
+        .collect()
+}
+
+const SQUATTER: BridgeId = BridgeId::new(9);
+
+#[test]
+fn who_squats_an_id_is_named_once_and_frees_it_when_it_goes() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &["60 control=127"]);
+    let token = |from| bridge(from, &[]).token_key(OPERATOR);
+    announce_by(SQUATTER, now, &mut vehicle, OPERATOR);
+    assert_eq!(identified(now, &mut vehicle), [""; 0], "nobody is kept out");
+
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
+    let both = [token(SQUATTER), token(HERE)];
+    assert_eq!(identified(now, &mut vehicle), both);
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, REQUEST_CONTROL), HERE);
+    for _ in 0..5 {
+        vehicle.handle_sample(now, &key, &octets);
+    }
+    assert_eq!(vehicle.counters().get(Counter::OtherBridge), 6);
+    assert!(arrivals(&mut vehicle).is_empty());
+    assert_eq!(identified(now, &mut vehicle), [""; 0], "once per change");
+
+    vehicle.handle_token(now, &token(SQUATTER), false);
+    vehicle.handle_sample(now, &key, &octets);
+    let passed = arrivals(&mut vehicle);
+    assert!(
+        matches!(passed[..], [Arrival::Closed(_), Arrival::Datagram { .. }]),
+        "{passed:?}"
+    );
+    announce_by(SQUATTER, now, &mut vehicle, OPERATOR);
+    let both = [token(HERE), token(SQUATTER)];
+    assert_eq!(identified(now, &mut vehicle), both, "a change");
+}
+
+#[test]
+fn a_bridge_without_the_token_of_an_id_is_refused_and_named_once() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &["60 control=127"]);
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, REQUEST_CONTROL), HERE);
+    for _ in 0..3 {
+        vehicle.handle_sample(now, &key, &octets);
+    }
+    assert!(arrivals(&mut vehicle).is_empty());
+    assert_eq!(vehicle.counters().get(Counter::NotAnnounced), 3);
+    let token = bridge(HERE, &[]).token_key(OPERATOR);
+    assert_eq!(identified(now, &mut vehicle), [token]);
 }
 
 #[test]
@@ -154,12 +225,13 @@ fn a_payload_is_exactly_one_message_with_the_as5669a_header() {
 fn messages_that_the_node_does_not_take_have_a_bound() {
     let now = Instant::now();
     let mut vehicle = bridge(THERE, &[]);
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
     let (key, octets) = sample(&frame(OPERATOR, DRIVER, QUERY), HERE);
-    for _ in 0..MOST_ARRIVALS + 3 {
+    for _ in 0..MOST_OF_SESSION.messages + 3 {
         vehicle.handle_sample(now, &key, &octets);
     }
     assert_eq!(vehicle.counters().get(Counter::InboxFull), 3);
-    assert_eq!(arrivals(&mut vehicle).len(), MOST_ARRIVALS);
+    assert_eq!(arrivals(&mut vehicle).len(), MOST_OF_SESSION.messages);
     vehicle.handle_sample(now, &key, &octets);
     assert_eq!(arrivals(&mut vehicle).len(), 1);
 }
@@ -168,7 +240,7 @@ fn messages_that_the_node_does_not_take_have_a_bound() {
 fn the_table_of_this_sides_components_has_a_bound() {
     let now = Instant::now();
     let mut here = bridge(HERE, &[]);
-    for number in 0..=MOST_LOCAL {
+    for number in 0..=MOST_OF_BRIDGE {
         let source = JausId::new(1 + number as u16, 1, 1);
         here.transmit(now, &to_group(&[frame(source, JausId::EVERYONE, QUERY)]));
         samples(now, &mut here);

@@ -35,6 +35,8 @@ pub(super) struct Settings {
     pub(super) last_number: u16,
     /// The intended id of our node, if one is chosen.
     pub(super) wanted: Option<JausId>,
+    /// Whether it is over a secure link, which has no ports and no multicast.
+    pub(super) is_secure: bool,
     /// Our port.
     pub(super) port: u16,
     /// Why there is no multicast group, if so.

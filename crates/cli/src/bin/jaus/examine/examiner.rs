@@ -205,6 +205,9 @@ impl Examiner {
 }
 
 fn begin(exchange: Exchange, case: &mut Case, now: Duration) -> Begin {
+    if case.settings.is_secure && exchange.is_about_sockets() {
+        return Begin::Over(Verdict::skipped("it is reached by a secure link"));
+    }
     match exchange {
         Exchange::Find => reach::find(case),
         Exchange::Reach => reach::reach(case),

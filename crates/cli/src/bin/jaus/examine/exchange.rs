@@ -133,6 +133,14 @@ impl Exchange {
         }
     }
 
+    /// Whether it is about sockets of plain links.
+    pub(super) const fn is_about_sockets(self) -> bool {
+        matches!(
+            self,
+            Self::Reach | Self::SourcePort | Self::MulticastBack | Self::Tcp | Self::Stacks
+        )
+    }
+
     /// Whether everything else depends on it.
     pub(super) const fn is_basic(self) -> bool {
         matches!(

@@ -17,6 +17,8 @@ mod ra;
 mod reach;
 mod report;
 mod reserved;
+#[cfg(feature = "secure")]
+mod secure;
 mod seen;
 mod silence;
 mod sockets;
@@ -39,8 +41,10 @@ use jaus_cli::output::{Output, colours_wanted, say};
 use jaus_cli::runtime;
 use tokio::time::{Instant, sleep_until};
 
-use self::case::Settings;
+use self::case::{Send, Settings};
 use self::examiner::Examiner;
+#[cfg(feature = "secure")]
+use self::secure::Sessions;
 pub(crate) use self::sockets::RA_GROUP;
 use self::sockets::{Happening, Sockets};
 use self::target::Target;
@@ -54,6 +58,7 @@ use self::target::Target;
     jaus examine 192.168.7.2\n  \
     jaus examine 77.1.1                   the same, found by its id\n  \
     jaus examine 77.1.1 --control         takes control and releases it, too\n  \
+    jaus examine 77.1.1 --id 42.1.9 --secure-peer 192.168.7.2\n  \
     jaus examine 77.1.1 --json | jq '.exchanges[] | select(.verdict == \"failed\")'")]
 pub(crate) struct Examine {
     /// The peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
@@ -79,39 +84,60 @@ pub(crate) struct Examine {
 
 impl Examine {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        self.network.require_plain()?;
+        self.network.require_dialling("jaus examine")?;
         let (wanted, config) = self.network.for_examination(passing_id())?;
         runtime::run(self.examine(wanted, config))
+    }
+
+    /// Opens the sockets, or the secure links; returns them with the settings of the examination.
+    async fn open(
+        &self,
+        wanted: Option<JausId>,
+        config: &Config,
+    ) -> Result<(Way, Settings), Failure> {
+        let mut settings = Settings {
+            target: self.target,
+            own: JausId::new(config.subsystem, config.node, 1),
+            last_number: RandomState::new().build_hasher().finish() as u16,
+            wanted,
+            is_secure: false,
+            port: 0,
+            no_group: None,
+            listen: self.timeout,
+            control: self.control,
+            payload_limit: config.payload_limit,
+        };
+        #[cfg(feature = "secure")]
+        if let Some(secure) = self.network.secure()? {
+            let (Some(own), None) = (wanted, self.target.address()) else {
+                return Err(Failure::new(
+                    "over a secure link, name the component by its id alone, and by --id one that its \
+                     node grants to the key of this host",
+                ));
+            };
+            // The peer refuses messages from other ids.
+            (settings.own, settings.wanted, settings.is_secure) = (own, None, true);
+            return Ok((Way::Secure(Sessions::open(&secure, own).await?), settings));
+        }
+        let mut sockets = Sockets::open(interfaces(config, self.target)?, config)?;
+        settings.port = sockets.local().map_or(0, |local| local.port());
+        settings.no_group = sockets.no_group.take();
+        Ok((Way::Plain(sockets), settings))
     }
 
     /// Examines the peer. `wanted` is the intended id of our node.
     async fn examine(&self, wanted: Option<JausId>, config: Config) -> Result<Outcome, Failure> {
         let config = config.or_any_free_port();
-        let mut sockets = Sockets::open(interfaces(&config, self.target)?, &config)?;
-        let local = sockets.local();
-        let settings = Settings {
-            target: self.target,
-            own: JausId::new(config.subsystem, config.node, 1),
-            last_number: RandomState::new().build_hasher().finish() as u16,
-            wanted,
-            port: local.map_or(0, |local| local.port()),
-            no_group: sockets.no_group.take(),
-            listen: self.timeout,
-            control: self.control,
-            payload_limit: config.payload_limit,
-        };
+        let (mut way, settings) = self.open(wanted, &config).await?;
         if !self.json {
-            let from = local.map_or_else(String::new, |local| format!(" at {local}"));
-            let on = sockets.names();
-            say(format_args!(
-                "asking {} as {}{from} on {on} …",
-                self.target, settings.own
-            ));
+            let (own, on) = (settings.own, way.name());
+            say(format_args!("asking {} as {own}{on} …", self.target));
         }
         let mut output = Output::new();
         let mut examiner = Examiner::new(settings);
         let colours = (!self.json).then(|| colours_wanted(&std::io::stdout()));
-        let whole = go_on(&mut examiner, &mut sockets, colours, &mut output).await?;
+        let whole = go_on(&mut examiner, &mut way, colours, &mut output).await?;
+        way.end().await;
         let case = examiner.case();
         if self.json {
             output.line(report::to_json(case, whole))?;
@@ -120,6 +146,56 @@ impl Examine {
             output.line(format_args!("\n{}", report::conclusion(case, whole)))?;
         }
         Ok(report::outcome(case, whole))
+    }
+}
+
+/// How messages reach the peer.
+enum Way {
+    Plain(Sockets),
+    #[cfg(feature = "secure")]
+    Secure(Sessions),
+}
+
+impl Way {
+    /// Our address and the interfaces, or the peers.
+    fn name(&self) -> String {
+        match self {
+            Self::Plain(sockets) => {
+                let local = sockets.local();
+                let from = local.map_or_else(String::new, |local| format!(" at {local}"));
+                format!("{from} on {}", sockets.names())
+            }
+            #[cfg(feature = "secure")]
+            Self::Secure(sessions) => format!(" by {}", sessions.names()),
+        }
+    }
+
+    /// Sends a message; a refusal by the system is returned as an event.
+    fn send(&mut self, send: &Send) -> Option<Happening> {
+        match self {
+            Self::Plain(sockets) => sockets.send(send),
+            #[cfg(feature = "secure")]
+            Self::Secure(sessions) => {
+                sessions.send(send);
+                None
+            }
+        }
+    }
+
+    /// Waits for the next event.
+    async fn next(&mut self) -> Happening {
+        match self {
+            Self::Plain(sockets) => sockets.next().await,
+            #[cfg(feature = "secure")]
+            Self::Secure(sessions) => sessions.next().await,
+        }
+    }
+
+    async fn end(&mut self) {
+        #[cfg(feature = "secure")]
+        if let Self::Secure(sessions) = self {
+            sessions.end().await;
+        }
     }
 }
 
@@ -162,7 +238,7 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
 )]
 async fn go_on(
     examiner: &mut Examiner,
-    sockets: &mut Sockets,
+    way: &mut Way,
     colours: Option<bool>,
     output: &mut Output,
 ) -> Result<bool, Failure> {
@@ -171,7 +247,7 @@ async fn go_on(
     tokio::pin!(stop);
     examiner.start(Duration::ZERO);
     loop {
-        send(examiner, sockets, begun);
+        send(examiner, way, begun);
         while let Some((trial, before)) = examiner.poll_trial() {
             let line = colours.and_then(|colours| report::line(trial, before, colours));
             line.map_or(Ok(()), |line| output.line(line))?;
@@ -182,19 +258,19 @@ async fn go_on(
         tokio::select! {
             () = &mut stop => {
                 examiner.leave();
-                send(examiner, sockets, begun);
+                send(examiner, way, begun);
                 return Ok(false);
             }
-            happening = sockets.next() => handle(examiner, begun, happening),
+            happening = way.next() => handle(examiner, begun, happening),
             () = sleep_until(begun + timeout) => examiner.handle_timeout(begun.elapsed()),
         }
     }
 }
 
 /// Sends the queued messages.
-fn send(examiner: &mut Examiner, sockets: &mut Sockets, begun: Instant) {
+fn send(examiner: &mut Examiner, way: &mut Way, begun: Instant) {
     while let Some(send) = examiner.poll_send() {
-        if let Some(happening) = sockets.send(&send) {
+        if let Some(happening) = way.send(&send) {
             handle(examiner, begun, happening);
         }
     }

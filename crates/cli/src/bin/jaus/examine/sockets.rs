@@ -352,7 +352,7 @@ fn new(like: SocketAddr) -> io::Result<Socket> {
     Ok(socket)
 }
 
-fn encoded(frame: &Frame) -> Bytes {
+pub(super) fn encoded(frame: &Frame) -> Bytes {
     // Every message here fits its header.
     let plain = Frame {
         kind: Kind::default(),

@@ -61,10 +61,11 @@ impl Heard {
 
 impl JudgeNodes {
     /// Starts the judge's nodes: `id` is the main component's, `config` its node's. The other four
-    /// components are on a second node, on a port of its own.
+    /// components are on a second node, on a port of its own. `start` starts a node.
     pub(super) fn start(
         id: JausId,
         config: Config,
+        start: impl Fn(Config) -> Result<Node, Failure>,
         subject: JausId,
         recording: Option<Recording>,
     ) -> Result<Self, Failure> {
@@ -76,9 +77,7 @@ impl JudgeNodes {
             config.node - 1
         };
         other.port = 0;
-        let nodes = [Node::start(config), Node::start(other)];
-        let [main, other] = nodes.map(|node| node.map_err(Failure::of));
-        let (main, other) = (main?, other?);
+        let (main, other) = (start(config)?, start(other)?);
         let attach = |node: &Node, component| node.attach(component).map_err(Failure::of);
         let ports = [
             attach(&main, id.component())?,

@@ -56,6 +56,10 @@ const MAIN: JausId = JausId::new(42, 1, 1);
 /// THE JUDGE COMMANDS THE COMPONENT, AND A VEHICLE DRIVES: about 9 metres along its X axis in task
 /// A6, and a few more in part C, which also checks that it stops.
 ///
+/// Over a secure link (--secure-peer) the component's node has to trust this host's key for the
+/// judge's ids, 42.255.255, with the right to do everything: `command control=255
+/// clear-emergency=any configure also=any`.
+///
 /// Exit status 1 means that a step failed, that no step applied, or that there was no answer.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -228,12 +232,13 @@ impl Judge {
     }
 
     async fn judge(&self, address: JausId, services: &Services) -> Result<Outcome, Failure> {
-        self.network.require_plain()?;
+        self.network.require_dialling("jaus judge")?;
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
         let dictionary = self.jsidl.load()?;
         let mut outputs = Outputs::open(self, services, &dictionary)?;
-        let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
+        let mut judge_nodes =
+            JudgeNodes::start(id, config, |it| self.network.start(it), address, recording)?;
         let Some(subject) = Subject::meet(&mut judge_nodes, address, self.timeout).await? else {
             judge_nodes.end().await?;
             say(format_args!(

@@ -1,5 +1,6 @@
 //! `jaus keys explain`: what a trusted key may do, message by message.
 
+use std::collections::BTreeSet;
 use std::fs;
 
 use clap::Args;
@@ -7,8 +8,9 @@ use jaus::address::JausId;
 use jaus::rights::{Permission, Rules, Selection, Table};
 use jaus::wire::Frame;
 use jaus_cli::failure::{Failure, Outcome};
-use jaus_cli::output::Output;
-use jaus_cli::secure::{KeyFiles, table_with};
+use jaus_cli::output::{Output, say};
+use jaus_cli::permissions::table_with;
+use jaus_cli::secure::KeyFiles;
 use jaus_secure::Trust;
 use serde_json::json;
 
@@ -46,11 +48,20 @@ impl Explain {
     pub(super) fn run(&self) -> Result<Outcome, Failure> {
         let table = table_with(self.jsidl.paths())?;
         let all_rules = self.rules()?;
-        let mut codes: Vec<_> = table.codes().filter(|&code| self.chooses(code)).collect();
+        for named in &self.messages {
+            named.verify(&table).map_err(Failure::of)?;
+        }
+        for rules in &all_rules {
+            if let Err(error) = rules.verify(&table) {
+                say(format_args!("of the rules of `{}`: {error}", self.name));
+            }
+        }
         // What no definition has is explained if it is named.
-        codes.extend(self.messages.iter().flat_map(Selection::codes));
-        codes.sort_unstable();
-        codes.dedup();
+        let named = self.messages.iter().flat_map(|it| it.codes(&table));
+        let mut codes: BTreeSet<_> = named.collect();
+        if self.messages.is_empty() {
+            codes.extend(table.codes());
+        }
         let mut output = Output::new();
         for rules in &all_rules {
             for &code in &codes {
@@ -58,10 +69,6 @@ impl Explain {
             }
         }
         Ok(Outcome::complete_if(!codes.is_empty()))
-    }
-
-    fn chooses(&self, code: u16) -> bool {
-        self.messages.is_empty() || self.messages.iter().any(|it| it.contains(code))
     }
 
     /// The rules of the peer: one set for each of its keys.
@@ -124,13 +131,14 @@ impl Answer {
         // Without an authority, and with empty lists.
         let message = [&code.to_le_bytes()[..], &[0; 64]].concat();
         let to = rules.with.first().copied().unwrap_or(JausId::EVERYONE);
-        let needs = table.permission(&message);
-        let is_control = matches!(needs, Some(Permission::Control { .. }));
+        let needs = table.words(&message);
+        let is_control = |it| matches!(it, Permission::Control { .. });
+        let is_control = table.needs(&message).any(is_control);
         let frame = Frame::new(JausId::new(1, 1, 1), to, message.into());
         Self {
             code,
             name: table.names(code).join(","),
-            needs: needs.map_or_else(|| "also".to_owned(), |it| it.to_string()),
+            needs,
             most: rules.control.filter(|_| is_control),
             refusal: rules.check(&frame, table).err().map(|it| it.to_string()),
         }

@@ -25,6 +25,7 @@ fn settings(target: &str) -> Settings {
         own: OWN,
         last_number: 0,
         wanted: None,
+        is_secure: false,
         port: 3794,
         no_group: None,
         listen: Duration::from_secs(6),

@@ -29,8 +29,9 @@ pub fn table_with(paths: &[PathBuf]) -> Result<Table, Failure> {
     if let Some(message) = permissions.missing.first() {
         let (place, name) = (&message.location, &message.name);
         return Err(Failure::new(format!(
-            "{place}: `{name}` does not state what its sender needs: add the attribute \
-             `own:permission=\"command\"` to its `message_def`, or another right (docs/jsidl.md)"
+            "{place}: `{name}` does not state what its sender needs: write `own:permission=\"command\"` into \
+             its `message_def`, or `observe` if it changes nothing, or another right (docs/jsidl.md), and \
+             `xmlns:own=\"urn:jaus-rs:jsidl\"` into the root of the file"
         )));
     }
     Table::default()

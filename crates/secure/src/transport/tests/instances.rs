@@ -1,0 +1,174 @@
+//! Several programs with one key, in virtual time.
+
+use super::super::instances::{Instance, MOST_INSTANCES, PATIENCE};
+use super::*;
+
+/// A vehicle, and this many programs of one operator's host that have dialled it.
+fn vehicle_and_programs(programs: usize) -> (Network, TrustFile, Key) {
+    let (mut network, [_, rover], [_, operator]) = vehicle_and_operator();
+    for _ in 1..programs {
+        network.add(&operator, &rover, &[address(1)]);
+    }
+    network.run(SECOND);
+    (network, rover, operator)
+}
+
+fn sessions(network: &Network, host: usize) -> Vec<SessionId> {
+    let sessions = network.hosts[host].transport.sessions();
+    sessions.map(|it| it.session).collect()
+}
+
+/// Kills a program: without a farewell, and nothing is left at its address.
+fn kill(network: &mut Network, host: usize) {
+    network.hosts[host].address = address(200 + u8::try_from(host).unwrap());
+    network.hosts[host].transport = Transport::new(&key(), trusting([]), []);
+}
+
+fn received(network: &mut Network, host: usize) -> Vec<Bytes> {
+    std::mem::take(&mut network.hosts[host].received)
+}
+
+#[test]
+fn programs_with_one_key_live_side_by_side() {
+    let (mut network, ..) = vehicle_and_programs(3);
+    let at_vehicle = sessions(&network, 0);
+    assert_eq!(at_vehicle.len(), 3);
+    for round in 0..60 {
+        let sent: Vec<_> = (1..4).map(|it| judp(&format!("60.{it}.1"), 20)).collect();
+        for (host, datagram) in (1..4).zip(&sent) {
+            network.send(host, Priority::Standard, datagram);
+        }
+        network.run(SECOND);
+        assert_eq!(received(&mut network, 0), sent, "round {round}");
+    }
+    assert_eq!(sessions(&network, 0), at_vehicle);
+    assert_eq!(network.count(0, Counter::SessionsEstablished), 3);
+    // What is for one of them goes to it alone.
+    let report = judp("101.1.33", 20);
+    network.hosts[0]
+        .transport
+        .send(at_vehicle[1], Priority::Standard, &report);
+    network.run(SECOND);
+    let each = [1, 2, 3].map(|host| network.hosts[host].received.len());
+    assert_eq!(each, [0, 1, 0]);
+}
+
+#[test]
+fn an_id_remains_with_the_living_program_that_uses_it() {
+    let (mut network, ..) = vehicle_and_programs(2);
+    let (own, of_other) = (judp("60.1.1", 20), judp("60.1.1", 30));
+    network.send(1, Priority::Standard, &own);
+    network.run(SECOND);
+    let before = sessions(&network, 0);
+    for _ in 0..60 {
+        network.send(2, Priority::Standard, &of_other);
+        network.send(2, Priority::Standard, &judp("60.2.1", 40));
+        network.run(SECOND / 2);
+        network.send(1, Priority::Standard, &own);
+        network.run(SECOND / 2);
+    }
+    let received = received(&mut network, 0);
+    assert_eq!(received.iter().filter(|it| **it == own).count(), 61);
+    assert_eq!(received.iter().filter(|it| **it == of_other).count(), 0);
+    assert_eq!(received.len(), 121, "its other id is free");
+    assert_eq!(network.count(0, Counter::DisputedIds), 60);
+    assert!(network.count(2, Counter::NoticesReceived) > 0);
+    assert_eq!(sessions(&network, 0), before, "nobody is thrown out");
+}
+
+#[test]
+fn a_program_that_was_killed_and_started_again_has_its_id_within_two_seconds() {
+    let (mut network, rover, operator) = vehicle_and_programs(2);
+    let old = judp("60.1.1", 20);
+    network.send(1, Priority::Standard, &old);
+    network.run(SECOND);
+    kill(&mut network, 1);
+    let again = network.add(&operator, &rover, &[address(1)]);
+    network.run(SECOND / 2);
+    let new = judp("60.1.1", 30);
+    for _ in 0..15 {
+        network.send(again, Priority::Standard, &new);
+        network.run(SECOND / 10);
+    }
+    let received = received(&mut network, 0);
+    assert!(received.contains(&new), "{}", received.len());
+    assert_eq!(network.hosts[0].closed.len(), 1);
+    // The other program, which uses another id, has noticed nothing.
+    assert!(network.hosts[2].closed.is_empty());
+}
+
+#[test]
+fn an_id_that_is_no_longer_used_is_free() {
+    let (mut network, ..) = vehicle_and_programs(2);
+    network.send(1, Priority::Standard, &judp("60.1.1", 20));
+    network.run(60 * SECOND);
+    let datagram = judp("60.1.1", 30);
+    network.send(2, Priority::Standard, &datagram);
+    network.run(SECOND);
+    assert!(network.hosts[0].received.contains(&datagram));
+    assert_eq!(sessions(&network, 0).len(), 2);
+}
+
+#[test]
+fn programs_before_this_version_replace_each_other_alone() {
+    let (mut network, rover, operator) = vehicle_and_programs(1);
+    network.run(PATIENCE);
+    for _ in 0..2 {
+        let mut old = Transport::new(&operator, rover.clone(), [address(1)]);
+        old.instance = Instance::UNNAMED;
+        let host = network.add(&operator, &rover, &[]);
+        network.hosts[host].transport = old;
+        network.run(SECOND / 10);
+        assert!(network.session(host).is_some(), "at once");
+        network.run(PATIENCE);
+        assert_eq!(sessions(&network, 0).len(), 2);
+        kill(&mut network, host);
+    }
+    assert!(network.hosts[1].closed.is_empty());
+    assert_eq!(network.hosts[0].closed.len(), 1);
+}
+
+#[test]
+fn a_program_before_this_version_accepts_those_that_tell_their_instance() {
+    let (mut network, trust, keys) = vehicle_and_operator();
+    let mut old = Transport::new(&keys[0], trust[0].clone(), []);
+    old.instance = Instance::UNNAMED;
+    network.hosts[0].transport = old;
+    network.run(10 * SECOND);
+    let datagram = judp("101.1.33", 20);
+    network.send(0, Priority::Standard, &datagram);
+    network.run(10 * SECOND);
+    assert_eq!(network.hosts[1].received, [datagram]);
+    assert_eq!(network.count(0, Counter::SessionsEstablished), 1);
+}
+
+#[test]
+fn a_key_has_a_bounded_number_of_programs_and_a_silent_one_gives_way() {
+    let (mut network, rover, operator) = vehicle_and_programs(MOST_INSTANCES);
+    let before = sessions(&network, 0);
+    assert_eq!(before.len(), MOST_INSTANCES);
+    let late = network.add(&operator, &rover, &[address(1)]);
+    network.run(60 * SECOND);
+    assert!(network.session(late).is_none());
+    assert_eq!(sessions(&network, 0), before, "nobody is thrown out");
+    let refused = network.count(0, Counter::TooManyInstances);
+    assert!((1..20).contains(&refused), "{refused}: with growing pauses");
+
+    kill(&mut network, 5);
+    network.run(10 * SECOND);
+    assert!(network.session(late).is_some());
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+}
+
+#[test]
+fn a_hello_is_no_key_to_the_session_of_another_program() {
+    let (mut network, rover, operator) = vehicle_and_programs(1);
+    let before = sessions(&network, 0);
+    // With the same key, but without the number, which only the peers of the program have been told.
+    for _ in 0..3 {
+        network.add(&operator, &rover, &[address(1)]);
+        network.run(5 * SECOND);
+    }
+    assert_eq!(sessions(&network, 0)[..1], before);
+    assert!(network.hosts[1].closed.is_empty());
+}
