@@ -324,6 +324,8 @@ impl Network {
                  --secure-announce and --secure-audit, or choose a settings file without them"
             )));
         }
+        #[cfg(not(feature = "secure"))]
+        let _ = command;
         Ok(())
     }
 
