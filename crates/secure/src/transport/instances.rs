@@ -212,7 +212,7 @@ impl Transport {
         let is_free = |frame: &Frame| !has_others || owner(frame.source).is_none();
         // What is no JUDP is counted by the next check.
         let Some(screened) = screen::screen(octets, |it| {
-            is_free(it).then_some(()).ok_or(Stop::ForeignId)
+            is_free(it).then_some(true).ok_or(Stop::ForeignId)
         }) else {
             return Some(octets.clone());
         };
