@@ -1,5 +1,8 @@
 //! A node's key: Ed25519, in a file that only its owner can read.
 
+#[cfg(feature = "ca")]
+mod sealed;
+
 use std::fmt;
 use std::fs;
 use std::io;
@@ -11,11 +14,15 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use jaus_files::Readers;
 use ring::digest::{Digest, SHA256, digest};
-use ring::rand::SystemRandom;
+use ring::rand::{SecureRandom as _, SystemRandom};
 use ring::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 use rustls::SignatureScheme;
 use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
 use rustls::sign::SigningKey;
+use zeroize::Zeroizing;
+
+#[cfg(feature = "ca")]
+pub use sealed::Passphrase;
 
 /// The octets before an Ed25519 key in a `SubjectPublicKeyInfo` (RFC 8410, section 4).
 const SPKI_PREFIX: [u8; 12] = [
@@ -23,6 +30,8 @@ const SPKI_PREFIX: [u8; 12] = [
 ];
 /// The longest key file, in octets.
 const LONGEST: u64 = 64 << 10;
+/// The label of a key file that is encrypted with a passphrase.
+const SEALED: &str = "ENCRYPTED PRIVATE KEY";
 /// Characters of a line of PEM.
 const PEM_LINE: usize = 64;
 
@@ -47,6 +56,24 @@ pub enum KeyError {
     /// The file does not contain an Ed25519 key.
     #[error("the key file {} contains no Ed25519 private key in PKCS #8 PEM", .0.display())]
     Malformed(PathBuf),
+    /// The file is encrypted, and there is no passphrase.
+    #[error(
+        "the key file {} is encrypted: only that of an authority may be, because nobody is asked for \
+         a passphrase when a node starts",
+        .0.display()
+    )]
+    Sealed(PathBuf),
+    /// The file is encrypted with another passphrase.
+    #[error("the key file {} is encrypted with another passphrase", .0.display())]
+    WrongPassphrase(PathBuf),
+    /// A passphrase is too short or too long.
+    #[cfg(feature = "ca")]
+    #[error(
+        "the passphrase has {0} characters: choose {shortest} to {longest}",
+        shortest = Passphrase::SHORTEST,
+        longest = Passphrase::LONGEST
+    )]
+    PassphraseLength(usize),
     /// The operating system provides no random numbers.
     #[error("the operating system provides no random numbers")]
     NoRandomness,
@@ -68,31 +95,36 @@ impl Key {
     /// # Errors
     /// If the file exists or cannot be written, or without random numbers.
     pub fn create(path: &Path) -> Result<Self, KeyError> {
+        let (key, der) = Self::generate()?;
+        publish(path, &pem("PRIVATE KEY", &der))?;
+        Ok(key)
+    }
+
+    /// A new key, and its PKCS #8 encoding.
+    fn generate() -> Result<(Self, Zeroizing<Vec<u8>>), KeyError> {
         let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
             .map_err(|_| KeyError::NoRandomness)?;
-        let key = Self::from_pkcs8(document.as_ref())
-            .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
-        let text = pem("PRIVATE KEY", document.as_ref());
-        jaus_files::create(path, Readers::Owner, text.as_bytes()).map_err(|source| match source
-            .kind()
-        {
-            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
-            _ => in_file(path, source),
-        })?;
-        Ok(key)
+        let der = Zeroizing::new(document.as_ref().to_vec());
+        let key = Self::from_pkcs8(&der).ok_or(KeyError::NoRandomness)?;
+        Ok((key, der))
     }
 
     /// Reads a key file.
     ///
     /// # Errors
-    /// If the file cannot be read, can be read by other users too, or contains no Ed25519 key.
+    /// If the file cannot be read, can be read by other users too, is encrypted, or contains no Ed25519
+    /// key.
     pub fn load(path: &Path) -> Result<Self, KeyError> {
-        Self::parse(&read(path)?).ok_or_else(|| KeyError::Malformed(path.to_owned()))
+        Self::parse(path, &read(path)?)
     }
 
-    fn parse(pem: &[u8]) -> Option<Self> {
-        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok()?;
-        Self::from_pkcs8(der.secret_pkcs8_der())
+    fn parse(path: &Path, pem: &[u8]) -> Result<Self, KeyError> {
+        if is_sealed(pem) {
+            return Err(KeyError::Sealed(path.to_owned()));
+        }
+        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok();
+        der.and_then(|it| Self::from_pkcs8(it.secret_pkcs8_der()))
+            .ok_or_else(|| KeyError::Malformed(path.to_owned()))
     }
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
@@ -118,7 +150,7 @@ impl Key {
     pub fn replace_by_next(path: &Path) -> Result<Self, KeyError> {
         let next = Self::next_path(path);
         let text = read(&next)?;
-        let key = Self::parse(&text).ok_or_else(|| KeyError::Malformed(next.clone()))?;
+        let key = Self::parse(&next, &text)?;
         jaus_files::replace(path, Readers::Owner, &text).map_err(|source| in_file(path, source))?;
         // Without the copy, because the next `--finish` would finish nothing.
         fs::remove_file(&next).map_err(|source| in_file(&next, source))?;
@@ -264,8 +296,33 @@ fn in_file(path: &Path, source: io::Error) -> KeyError {
     }
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, KeyError> {
-    jaus_files::read(path, Readers::Owner, LONGEST).map_err(|source| in_file(path, source))
+fn read(path: &Path) -> Result<Zeroizing<Vec<u8>>, KeyError> {
+    jaus_files::read(path, Readers::Owner, LONGEST)
+        .map(Zeroizing::new)
+        .map_err(|source| in_file(path, source))
+}
+
+/// Writes the file of a new key.
+fn publish(path: &Path, text: &str) -> Result<(), KeyError> {
+    jaus_files::create(path, Readers::Owner, text.as_bytes()).map_err(|source| {
+        match source.kind() {
+            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
+            _ => in_file(path, source),
+        }
+    })
+}
+
+/// Whether the text of a key file is encrypted with a passphrase.
+fn is_sealed(pem: &[u8]) -> bool {
+    String::from_utf8_lossy(pem).contains(&format!("-----BEGIN {SEALED}-----"))
+}
+
+/// Random octets.
+pub(crate) fn random<const N: usize>() -> Result<[u8; N], KeyError> {
+    let mut octets = [0; N];
+    let filled = SystemRandom::new().fill(&mut octets);
+    filled.map_err(|_| KeyError::NoRandomness)?;
+    Ok(octets)
 }
 
 #[cfg(test)]

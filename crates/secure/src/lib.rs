@@ -53,6 +53,8 @@ mod trust;
 pub use authority::{Authority, Rejection};
 pub use certificate::{Certificate, CertificateError, Defect};
 pub use credentials::{CertificateFiles, Credentials, CredentialsError};
+#[cfg(feature = "ca")]
+pub use key::Passphrase;
 pub use key::{Fingerprint, Key, KeyError, PublicKey};
 pub use link::{Announce, OpenError, Reached, SecureLink, Settings};
 pub use trust::{Grant, Peer, Trust, TrustError, TrustFile};
