@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use jaus_files::Followed;
+use rustls::crypto::CryptoProvider;
 use rustls::pki_types::{CertificateDer, UnixTime};
 use rustls::sign::CertifiedKey;
 
 use crate::authority::{Authority, Rejection};
 use crate::certificate::{Certificate, CertificateError, shown};
+use crate::crypto;
 use crate::follow::{KEEPING, REFUSING, follow};
 use crate::key::{Key, PublicKey};
 use crate::trust::{Peer, TrustFile};
@@ -59,6 +61,7 @@ pub struct Credentials {
     authority: Option<Followed<Authority, CertificateError>>,
     /// The wall clock, in seconds since 1970.
     clock: Arc<AtomicU64>,
+    provider: Arc<CryptoProvider>,
 }
 
 /// A peer that has proved who it is.
@@ -128,6 +131,7 @@ impl Credentials {
             trust,
             authority,
             clock: Arc::default(),
+            provider: crypto::provider(),
         }
     }
 
@@ -143,6 +147,11 @@ impl Credentials {
 
     pub(crate) fn own_key(&self) -> Key {
         self.own.get().key.clone()
+    }
+
+    /// What TLS is made of.
+    pub(crate) const fn provider(&self) -> &Arc<CryptoProvider> {
+        &self.provider
     }
 
     /// Whether the node uses certificates.
@@ -251,6 +260,13 @@ impl Credentials {
             own,
             ..self.clone()
         }
+    }
+
+    /// The same, with TLS of another library.
+    #[cfg(all(test, feature = "aws-lc", feature = "ring"))]
+    pub(crate) fn with_provider(self, provider: CryptoProvider) -> Self {
+        let provider = Arc::new(provider);
+        Self { provider, ..self }
     }
 
     /// Why the node's own certificate is not accepted now or will not be soon, and the remedy.

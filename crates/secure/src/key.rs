@@ -13,9 +13,6 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use jaus_files::Readers;
-use ring::digest::{Digest, SHA256, digest};
-use ring::rand::{SecureRandom as _, SystemRandom};
-use ring::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 use rustls::SignatureScheme;
 use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
 use rustls::sign::SigningKey;
@@ -23,6 +20,11 @@ use zeroize::Zeroizing;
 
 #[cfg(feature = "ca")]
 pub use sealed::Passphrase;
+
+use crate::crypto;
+use crate::crypto::digest::{Digest, SHA256, digest};
+use crate::crypto::rand::{SecureRandom as _, SystemRandom};
+use crate::crypto::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 
 /// The octets before an Ed25519 key in a `SubjectPublicKeyInfo` (RFC 8410, section 4).
 const SPKI_PREFIX: [u8; 12] = [
@@ -128,8 +130,8 @@ impl Key {
     }
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
-        let der = PrivatePkcs8KeyDer::from(octets);
-        let signing = rustls::crypto::ring::sign::any_eddsa_type(&der).ok()?;
+        let der = PrivatePkcs8KeyDer::from(octets.to_vec());
+        let signing = crypto::provider().key_provider.load_private_key(der.into()).ok()?;
         let public = PublicKey::from_spki(signing.public_key()?.as_ref())?;
         Some(Self { signing, public })
     }
