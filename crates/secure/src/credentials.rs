@@ -86,7 +86,7 @@ impl Credentials {
     /// If the key file cannot be used.
     pub fn load(key: &Path, trust: TrustFile) -> Result<Self, CertificateError> {
         let path = key.to_owned();
-        let own = Followed::load(vec![path.clone()], move || Identity::load(&path, None))?;
+        let own = Followed::load(Key::files(key), move || Identity::load(&path, None))?;
         Ok(Self::new(own, trust, None))
     }
 
@@ -102,9 +102,9 @@ impl Credentials {
         now: SystemTime,
     ) -> Result<Self, CredentialsError> {
         let (key, path) = (key.to_owned(), files.certificate.clone());
-        let own = Followed::load(vec![key.clone(), path.clone()], move || {
-            Identity::load(&key, Some(&path))
-        })?;
+        let mut followed = Key::files(&key);
+        followed.push(path.clone());
+        let own = Followed::load(followed, move || Identity::load(&key, Some(&path)))?;
         let (certificate, revoked) = (files.authority.clone(), files.revoked.clone());
         let paths = [certificate.clone()].into_iter().chain(revoked.clone());
         let authority = Followed::load(paths.collect(), move || {

@@ -1,7 +1,11 @@
-//! A node's key: Ed25519, in a file that only its owner can read.
+//! A node's key: Ed25519, in a file that only its owner can read, or in a token.
 
 #[cfg(feature = "ca")]
 mod sealed;
+#[cfg(feature = "pkcs11")]
+mod token;
+#[cfg(feature = "pkcs11")]
+mod uri;
 
 use std::fmt;
 use std::fs;
@@ -34,6 +38,8 @@ const SPKI_PREFIX: [u8; 12] = [
 const LONGEST: u64 = 64 << 10;
 /// The label of a key file that is encrypted with a passphrase.
 const SEALED: &str = "ENCRYPTED PRIVATE KEY";
+/// How the URI of a key in a token begins.
+const TOKEN: &str = "pkcs11:";
 /// Characters of a line of PEM.
 const PEM_LINE: usize = 64;
 
@@ -76,12 +82,35 @@ pub enum KeyError {
         longest = Passphrase::LONGEST
     )]
     PassphraseLength(usize),
+    /// The key in a token cannot be used.
+    #[error("the key {uri}: {what}")]
+    Token {
+        /// The key.
+        uri: String,
+        /// The reason.
+        what: String,
+    },
     /// The operating system provides no random numbers.
     #[error("the operating system provides no random numbers")]
     NoRandomness,
     /// A text is not a public key.
     #[error("`{0}` is not a public key: 44 characters of base64 are expected")]
     Text(String),
+}
+
+/// Without the feature, no key in a token can be used.
+#[cfg(not(feature = "pkcs11"))]
+mod token {
+    use super::{Key, KeyError, Path};
+
+    pub(super) fn load(path: &Path) -> Result<Key, KeyError> {
+        Err(KeyError::Token {
+            uri: path.display().to_string(),
+            what: "this program is built without the feature `pkcs11`".to_owned(),
+        })
+    }
+
+    pub(super) use load as create;
 }
 
 /// The private key of a node. It is never shown or logged.
@@ -92,11 +121,21 @@ pub struct Key {
 }
 
 impl Key {
-    /// Makes a new key and writes it to a file that only its owner can read.
+    /// Whether this names a key in a token, by a PKCS #11 URI (RFC 7512), and not a file.
+    #[must_use]
+    pub fn is_in_token(path: &Path) -> bool {
+        path.to_str().is_some_and(|it| it.starts_with(TOKEN))
+    }
+
+    /// Makes a new key and writes it to a file that only its owner can read. With a PKCS #11 URI in place
+    /// of a path, the token makes the key and keeps it.
     ///
     /// # Errors
-    /// If the file exists or cannot be written, or without random numbers.
+    /// If the file or key exists or cannot be written, or without random numbers.
     pub fn create(path: &Path) -> Result<Self, KeyError> {
+        if Self::is_in_token(path) {
+            return token::create(path);
+        }
         let (key, der) = Self::generate()?;
         publish(path, &pem("PRIVATE KEY", &der))?;
         Ok(key)
@@ -111,12 +150,15 @@ impl Key {
         Ok((key, der))
     }
 
-    /// Reads a key file.
+    /// Reads a key file, or finds the key in a token that a PKCS #11 URI names.
     ///
     /// # Errors
     /// If the file cannot be read, can be read by other users too, is encrypted, or contains no Ed25519
-    /// key.
+    /// key; if the token or its key cannot be used.
     pub fn load(path: &Path) -> Result<Self, KeyError> {
+        if Self::is_in_token(path) {
+            return token::load(path);
+        }
         Self::parse(path, &read(path)?)
     }
 
@@ -131,9 +173,18 @@ impl Key {
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
         let der = PrivatePkcs8KeyDer::from(octets.to_vec());
-        let signing = crypto::provider().key_provider.load_private_key(der.into()).ok()?;
+        let signing = crypto::provider()
+            .key_provider
+            .load_private_key(der.into())
+            .ok()?;
         let public = PublicKey::from_spki(signing.public_key()?.as_ref())?;
         Some(Self { signing, public })
+    }
+
+    /// The files that a key is read from: none for a key in a token.
+    pub(crate) fn files(path: &Path) -> Vec<PathBuf> {
+        let in_file = (!Self::is_in_token(path)).then(|| path.to_owned());
+        in_file.into_iter().collect()
     }
 
     /// The file of the key that is to replace the one in `path`: `node.key.next`.
@@ -172,8 +223,11 @@ impl Key {
 
     /// A secret for another purpose, the same whenever the node runs with this key.
     pub(crate) fn secret_for(&self, purpose: &[u8]) -> Digest {
-        // Ed25519 signs everything, and the same text always in the same way.
-        digest(&SHA256, &self.sign(purpose).unwrap_or_default())
+        // Ed25519 signs the same text always in the same way. If a token does not sign, the secret is another
+        // one after the next start.
+        let signature = self.sign(purpose);
+        let signature = signature.or_else(|| random::<32>().ok().map(Vec::from));
+        digest(&SHA256, &signature.unwrap_or_default())
     }
 
     /// Signs a message; `None` if the key refuses to.

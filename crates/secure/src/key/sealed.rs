@@ -7,7 +7,7 @@ use std::path::Path;
 use jaus_files::Readers;
 use pkcs8::pkcs5::pbes2::Parameters;
 use pkcs8::pkcs5::{self, scrypt};
-use pkcs8::{EncryptedPrivateKeyInfoRef, SecretDocument};
+use pkcs8::{EncryptedPrivateKeyInfoRef, PrivateKeyInfoRef, SecretDocument};
 use rustls::pki_types::{PrivatePkcs8KeyDer, pem::PemObject as _};
 use zeroize::Zeroizing;
 
@@ -102,12 +102,16 @@ fn encode(
         return Ok(Zeroizing::new(pem("PRIVATE KEY", der)));
     };
     let (salt, iv) = (random::<16>()?, random()?);
-    let sealed = scrypt::Params::new(LOG_N, BLOCK, PASSES)
+    let parameters = scrypt::Params::new(LOG_N, BLOCK, PASSES)
         .ok()
-        .and_then(|cost| Parameters::generate_scrypt_aes256cbc(cost, &salt, iv).ok())
-        .and_then(|it| {
-            let passphrase = passphrase.0.as_bytes();
-            EncryptedPrivateKeyInfoRef::encrypt_with_params(it, passphrase, der).ok()
+        .and_then(|cost| Parameters::generate_scrypt_aes256cbc(cost, &salt, iv).ok());
+    let sealed = PrivateKeyInfoRef::try_from(der)
+        .ok()
+        .zip(parameters)
+        .and_then(|(key, it)| {
+            // OpenSSL 3.0 does not read version 2, which has the public key as well.
+            let key = PrivateKeyInfoRef::new(key.algorithm, key.private_key);
+            key.encrypt_with_params(it, passphrase.0.as_bytes()).ok()
         })
         .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
     Ok(Zeroizing::new(pem(SEALED, sealed.as_bytes())))
@@ -127,11 +131,11 @@ fn decode(path: &Path, passphrase: Option<&Passphrase>) -> Result<Zeroizing<Vec<
     let sealed =
         EncryptedPrivateKeyInfoRef::try_from(sealed.as_bytes()).map_err(|_| malformed())?;
     match sealed.decrypt(passphrase.0.as_bytes()) {
-        // One wrong passphrase in 256 leaves octets that end like a key: they are none.
-        Ok(der) if Key::from_pkcs8(der.as_bytes()).is_some() => Ok(der.to_bytes()),
-        Ok(_) | Err(pkcs8::Error::EncryptedPrivateKey(pkcs5::Error::DecryptFailed)) => {
-            Err(KeyError::WrongPassphrase(path.to_owned()))
-        }
+        Ok(der) => Ok(der.to_bytes()),
+        // One wrong passphrase in 256 leaves octets that are well padded, but no DER.
+        Err(
+            pkcs8::Error::EncryptedPrivateKey(pkcs5::Error::DecryptFailed) | pkcs8::Error::Asn1(_),
+        ) => Err(KeyError::WrongPassphrase(path.to_owned())),
         Err(_) => Err(malformed()),
     }
 }
