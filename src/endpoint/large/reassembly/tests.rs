@@ -327,7 +327,9 @@ fn a_sender_has_at_most_1024_runs() {
         (1, 1024)
     );
     assert!(
-        !rig.reassembly.senders[&PEER].runs.contains_key(&((US, None), 0)),
+        !rig.reassembly.senders[&PEER]
+            .runs
+            .contains_key(&((US, None), 0)),
         "the oldest"
     );
 }
