@@ -62,7 +62,7 @@ pub enum AuthorityError {
     /// The name is not usable.
     #[error(
         "`{}` cannot be a name: use 1 to 64 ASCII letters, digits and punctuation without `#`",
-        .0.escape_default()
+        jaus_text::visible(.0)
     )]
     Name(String),
     /// The certificate would have no ids, or too many.

@@ -43,4 +43,4 @@ pub use request::Request;
 pub use stream::Links;
 pub use stream::{Entry, Filter, FilterError, MessageStream};
 pub use time::{InvalidTime, Timestamp};
-pub use words::{FieldText, disturbs_terminal, quoted, symbol};
+pub use words::{FieldText, symbol};

@@ -208,10 +208,10 @@ fn a_line_for_people_names_who_what_and_the_fields_and_hides_control_characters(
         "source": name, "direction": name, "message": name, "body": {name: name},
     }));
     let shown = hostile.in_words(&dictionary, false);
-    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    assert!(!shown.contains(jaus_text::is_unprintable), "{shown}");
     let error = entry(json!({"message": "M", "error": name}));
     let shown = error.in_words(&dictionary, false);
-    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    assert!(!shown.contains(jaus_text::is_unprintable), "{shown}");
     assert!(velocity().in_words(&dictionary, true).contains("\u{1b}["));
 }
 
