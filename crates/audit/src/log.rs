@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(lines.len(), 3);
         assert_eq!(lines[0]["what"], "SetWrenchEffort");
         assert_eq!(lines[0].get("times"), None);
-        assert_eq!(lines[1]["who"], "console\n");
+        assert_eq!(lines[1]["who"], r"console\n");
         assert_eq!(lines[2]["times"], 99);
     }
 

@@ -19,7 +19,6 @@ mod line;
 mod log;
 mod named;
 mod network;
-pub mod places;
 mod query;
 mod request;
 mod stream;

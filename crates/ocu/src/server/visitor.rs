@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use jaus_view::places::Place;
+use jaus_limits::Place;
 
 use super::logins::LoginId;
 use crate::users::UserRole;
