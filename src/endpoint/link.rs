@@ -5,6 +5,7 @@ use std::fmt;
 use std::net::SocketAddr;
 
 use bytes::Bytes;
+use jaus_limits::quota_address;
 
 use crate::wire::{Framing, Priority};
 
@@ -68,6 +69,16 @@ pub enum Remote {
 }
 
 impl Remote {
+    /// The remote end without what one host chooses at will: the port, and of IPv6 the last 64 bits.
+    /// What comes from equal origins shares limits.
+    #[must_use]
+    pub fn origin(self) -> Self {
+        match self {
+            Self::Socket(address) => Self::Socket((quota_address(address.ip()), 0).into()),
+            other => other,
+        }
+    }
+
     /// The address, if it has one.
     #[must_use]
     pub const fn socket(self) -> Option<SocketAddr> {

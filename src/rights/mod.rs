@@ -188,7 +188,7 @@ impl Rules {
             except: Selection::default(),
             ..self.clone()
         };
-        everywhere == Self::default() && self.except.contains(SetEmergency::CODE)
+        everywhere == Self::default() && self.except.contains(SetEmergency::CODE, &Table::default())
     }
 
     /// Checks a frame from the sender; the table tells what messages need. Later fragments pass: without

@@ -61,8 +61,8 @@ impl Entry {
     pub fn new(who: impl Display, what: impl Display, result: Outcome) -> Self {
         Self {
             time: SystemTime::now(),
-            who: who.to_string(),
-            what: what.to_string(),
+            who: text(who),
+            what: text(what),
             to: None,
             result,
             why: None,
@@ -99,35 +99,35 @@ impl Entry {
     /// To whom it was done.
     #[must_use]
     pub fn to(mut self, whom: impl Display) -> Self {
-        self.to = Some(whom.to_string());
+        self.to = Some(text(whom));
         self
     }
 
     /// The reason for the result, or details.
     #[must_use]
     pub fn because(mut self, why: impl Display) -> Self {
-        self.why = Some(why.to_string());
+        self.why = Some(text(why));
         self
     }
 
     /// The JAUS id that acted.
     #[must_use]
     pub fn id(mut self, id: impl Display) -> Self {
-        self.id = Some(id.to_string());
+        self.id = Some(text(id));
         self
     }
 
     /// The network address of who acted.
     #[must_use]
     pub fn address(mut self, address: impl Display) -> Self {
-        self.address = Some(address.to_string());
+        self.address = Some(text(address));
         self
     }
 
     /// The public key of who acted.
     #[must_use]
     pub fn key(mut self, key: impl Display) -> Self {
-        self.key = Some(key.to_string());
+        self.key = Some(text(key));
         self
     }
 
@@ -169,6 +169,11 @@ impl Entry {
     }
 }
 
+/// A text for the log: reasons and names can be those of peers.
+fn text(it: impl Display) -> String {
+    jaus_text::visible(&it.to_string()).into_owned()
+}
+
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn is_once(times: &u64) -> bool {
     *times == 1
@@ -176,4 +181,25 @@ fn is_once(times: &u64) -> bool {
 
 fn rfc3339<S: Serializer>(time: &SystemTime, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(&humantime::format_rfc3339_millis(*time))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_text_of_an_entry_is_printable_and_bounded() {
+        let name = format!("Müller\x1b[2J\r\n{{}}\u{202e}\u{9b}{}", "x".repeat(70_000));
+        let entry = Entry::new(&name, &name, Outcome::Failed);
+        let entry = entry
+            .to(&name)
+            .because(&name)
+            .id(&name)
+            .address(&name)
+            .key(&name);
+        let line = serde_json::to_string(&entry).unwrap();
+        assert!(!line.contains(jaus_text::is_unprintable), "{line:?}");
+        assert_eq!(line.matches("Müller").count(), 7);
+        assert!(line.len() < 8_000, "{}", line.len());
+    }
 }

@@ -173,7 +173,7 @@ mod tests {
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(lines.len(), 4, "{text}");
         assert!(
-            lines[0].contains(r#""who":"con\nsole","what":"login""#),
+            lines[0].contains(r#""who":"con\\nsole","what":"login""#),
             "{text}"
         );
         assert_eq!(lines[1], "PRIORITY=4");

@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(lines.len(), 3);
         assert_eq!(lines[0]["what"], "Reset");
         assert_eq!(lines[0].get("times"), None);
-        assert_eq!(lines[1]["who"], "console\n");
+        assert_eq!(lines[1]["who"], r"console\n");
         assert_eq!(
             (&lines[2]["times"], &lines[2]["number"]),
             (&99.into(), &3.into())

@@ -1,7 +1,9 @@
 //! Sends the library's tracing to standard error or the journal, at a level that can change while
 //! the program runs.
 
-use std::io::{self, Write};
+mod visible;
+
+use std::io;
 use std::path::Path;
 #[cfg(unix)]
 use std::path::PathBuf;
@@ -19,9 +21,10 @@ use tracing_subscriber::{Registry, reload};
 
 use super::failure::Failure;
 use super::log_level::LogLevel;
-use super::output::{colours_wanted, harmless};
+use super::output::colours_wanted;
 #[cfg(unix)]
 use super::settings;
+use visible::Visible;
 
 /// The verbosity flag of every program.
 #[derive(Args, Debug, Clone, Copy)]
@@ -120,25 +123,27 @@ impl Logging {
         // and panics.
         let layer = tracing_subscriber::fmt::layer().log_internal_errors(false);
         Ok(match self.log_format {
-            LogFormat::Text => layer
-                .with_writer(|| OneLine(io::stderr()))
-                .with_ansi(colours_wanted(&io::stderr()))
-                .with_target(self.verbose > 1)
-                .boxed(),
-            LogFormat::Json => layer
-                .with_writer(io::stderr)
-                .json()
-                .flatten_event(true)
-                .boxed(),
-            LogFormat::Journald => tracing_journald::layer()
-                .map_err(|error| {
-                    Failure::new(format!(
-                        "--log-format journald: no journal of systemd on this host ({error}); \
-                         choose text or json"
-                    ))
-                })?
-                .with_field_prefix(Some("JAUS".to_owned()))
-                .boxed(),
+            LogFormat::Text => Visible(
+                layer
+                    .with_writer(io::stderr)
+                    .with_ansi(colours_wanted(&io::stderr()))
+                    .with_target(self.verbose > 1),
+            )
+            .boxed(),
+            LogFormat::Json => {
+                Visible(layer.with_writer(io::stderr).json().flatten_event(true)).boxed()
+            }
+            LogFormat::Journald => Visible(
+                tracing_journald::layer()
+                    .map_err(|error| {
+                        Failure::new(format!(
+                            "--log-format journald: no journal of systemd on this host ({error}); \
+                             choose text or json"
+                        ))
+                    })?
+                    .with_field_prefix(Some("JAUS".to_owned())),
+            )
+            .boxed(),
         })
     }
 }
@@ -209,64 +214,5 @@ async fn read_level(file: Option<PathBuf>) {
 fn set(current: &Level, level: Targets) {
     if let Err(error) = current.handle.reload(level) {
         tracing::error!("the log level is unchanged: {error}");
-    }
-}
-
-/// Writes each event as one line, whatever text of a peer it holds.
-struct OneLine<W>(W);
-
-impl<W: Write> Write for OneLine<W> {
-    /// Takes an event: the subscriber hands each over in one call.
-    fn write(&mut self, event: &[u8]) -> io::Result<usize> {
-        let text = String::from_utf8_lossy(event);
-        let text = text.strip_suffix('\n').unwrap_or(&text);
-        let line = harmless(text).replace('\n', r"\n");
-        writeln!(self.0, "{line}")?;
-        Ok(event.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::{Arc, Mutex};
-
-    use super::*;
-
-    #[derive(Clone, Default)]
-    struct Written(Arc<Mutex<Vec<u8>>>);
-
-    impl Write for Written {
-        fn write(&mut self, octets: &[u8]) -> io::Result<usize> {
-            self.0.lock().unwrap().extend_from_slice(octets);
-            Ok(octets.len())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    #[test]
-    fn an_event_is_one_line_whatever_name_it_holds() {
-        let written = Written::default();
-        let to = written.clone();
-        let layer = tracing_subscriber::fmt::layer()
-            .with_ansi(false)
-            .with_writer(move || OneLine(to.clone()));
-        let log = tracing_subscriber::registry().with(layer);
-        let name = "\x1b]0;title\x07\r\nfake line \u{202e}";
-        tracing::subscriber::with_default(log, || tracing::info!("the name is {name}"));
-        let written = written.0.lock().unwrap().clone();
-        let text = String::from_utf8(written).unwrap();
-        assert_eq!(text.matches('\n').count(), 1, "{text}");
-        assert!(text.contains(r"title"), "{text}");
-        assert!(
-            !text.trim_end().contains(jaus_view::disturbs_terminal),
-            "{text}"
-        );
     }
 }

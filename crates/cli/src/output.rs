@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 
-use super::failure::Failure;
+use jaus_text::{is_unprintable, push_json};
 
-pub use jaus_view::{disturbs_terminal, quoted};
+use super::failure::Failure;
 
 /// Environment variable by which `jaus up` tells its parts that their output goes to a log, not to
 /// a terminal: they show no secrets in it.
@@ -41,6 +41,8 @@ pub fn size(octets: u64) -> String {
 /// Standard output. Every line is flushed when [`line`](Self::line) returns.
 pub struct Output {
     out: StdoutLock<'static>,
+    /// Whether colours may be in it.
+    colours: bool,
 }
 
 impl Default for Output {
@@ -52,9 +54,9 @@ impl Default for Output {
 impl Output {
     /// Opens standard output.
     pub fn new() -> Self {
-        Self {
-            out: io::stdout().lock(),
-        }
+        let out = io::stdout().lock();
+        let colours = colours_wanted(&out);
+        Self { out, colours }
     }
 
     /// Prints text that is no line: a screen.
@@ -62,11 +64,13 @@ impl Output {
         self.write(format_args!("{text}"))
     }
 
-    /// Prints a line, or several. Control characters other than line ends, tabs and colours are
-    /// escaped as in JSON, on a terminal and elsewhere. Text from the network goes through
-    /// [`quoted`], so that it adds no lines.
+    /// Prints a line, or several. Unprintable characters other than line ends, tabs and colours of a
+    /// terminal are escaped as in JSON. Text from the network goes through
+    /// [`quoted`](jaus_text::quoted), so that it adds no lines and no colours.
     pub fn line(&mut self, text: impl Display) -> Result<(), Failure> {
-        self.write(format_args!("{}\n", harmless(&text.to_string())))
+        let text = text.to_string();
+        let shown = printable(&text, self.colours);
+        self.write(format_args!("{shown}\n"))
     }
 
     fn write(&mut self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
@@ -110,26 +114,31 @@ pub fn say(words: impl Display) {
 
 /// The same, for a program other than `jaus`.
 pub fn say_as(program: &str, words: impl Display) {
-    let words = words.to_string();
-    let words = harmless(&words);
-    let _ = writeln!(io::stderr().lock(), "{program}: {words}");
+    say_lines(format_args!("{program}: {words}"));
 }
 
-/// Escapes characters that disturb a terminal as in JSON, so that JSON stays the same value; except
-/// for line ends, tabs and colours.
-pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
-    let is_disturbing = |c| disturbs_terminal(c) && !matches!(c, '\n' | '\t');
-    if !text.contains(is_disturbing) {
+/// Prints lines on standard error. Errors are ignored.
+pub fn say_lines(lines: impl Display) {
+    let lines = lines.to_string();
+    let mut stderr = io::stderr().lock();
+    let lines = printable(&lines, colours_wanted(&stderr));
+    let _ = writeln!(stderr, "{lines}");
+}
+
+/// Lines of output in printable characters. The others are escaped as in JSON, so that JSON keeps its
+/// value; except for line ends, tabs and, if wanted, the colours of our own lines.
+fn printable(text: &str, colours: bool) -> Cow<'_, str> {
+    let is_hidden = |c| is_unprintable(c) && !matches!(c, '\n' | '\t');
+    if !text.contains(is_hidden) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
-        let colour = colour_at(rest);
+        let colour = colour_at(rest).filter(|_| colours);
         match colour {
             Some(sequence) => shown.push_str(sequence),
-            // All of them have four digits.
-            None if is_disturbing(first) => shown += &format!("\\u{:04x}", u32::from(first)),
+            None if is_hidden(first) => push_json(&mut shown, first),
             None => shown.push(first),
         }
         rest = &rest[colour.map_or(first.len_utf8(), str::len)..];
@@ -137,11 +146,14 @@ pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
     shown.into()
 }
 
-/// The sequence for a colour at the beginning of a text, such as `ESC [ 3 1 m`.
+/// The sequence for a colour at the beginning of a text, such as `ESC [ 3 1 m`: bold, dim, or a colour
+/// of letters. None hides them.
 fn colour_at(text: &str) -> Option<&str> {
     let parameters = text.strip_prefix("\x1b[")?;
-    let end = parameters.find(|c: char| !c.is_ascii_digit() && c != ';')?;
-    let is_colour = parameters[end..].starts_with('m');
+    let end = parameters.find(|c: char| !c.is_ascii_digit())?;
+    let colour = parameters[..end].parse();
+    let is_colour =
+        parameters[end..].starts_with('m') && matches!(colour, Ok(0_u8..=2 | 30..=37 | 90..=97));
     is_colour.then(|| &text[..text.len() - parameters.len() + end + 1])
 }
 
@@ -176,25 +188,27 @@ mod tests {
                 "\x1b[31mred\x1b[0m\tand\nnext",
                 "\x1b[31mred\x1b[0m\tand\nnext",
             ),
+            ("\x1b[8mhidden\x1b[41m", r"\u001b[8mhidden\u001b[41m"),
             ("\x1b]0;title\x07", r"\u001b]0;title\u0007"),
             ("\x1b[2Jclear\r", r"\u001b[2Jclear\u000d"),
             (
-                "\u{9b}31m \u{7f} \u{202e}gpj.exe",
-                r"\u009b31m \u007f \u202egpj.exe",
+                "\u{9b}31m \u{7f} \u{202e}gpj.exe\u{200b}",
+                r"\u009b31m \u007f \u202egpj.exe\u200b",
             ),
             ("\x1b", r"\u001b"),
             ("\x1b[1", r"\u001b[1"),
             ("Müller · 5 µs", "Müller · 5 µs"),
         ] {
-            assert_eq!(harmless(text), shown, "{text:?}");
+            assert_eq!(printable(text, true), shown, "{text:?}");
         }
+        assert_eq!(printable("\x1b[31mred", false), r"\u001b[31mred");
     }
 
     #[test]
-    fn json_with_a_disturbing_name_stays_the_same_value() {
-        let json = serde_json::json!({ "name": "\u{202e}gpj\u{9b}2J\u{7f}\r\n" });
-        let printed = harmless(&json.to_string()).into_owned();
-        assert!(!printed.contains(disturbs_terminal), "{printed}");
+    fn json_with_a_hostile_name_stays_the_same_value() {
+        let json = serde_json::json!({ "name": "\u{202e}gpj\u{9b}2J\u{7f}\r\n\u{e0041}" });
+        let printed = printable(&json.to_string(), true).into_owned();
+        assert!(!printed.contains(is_unprintable), "{printed}");
         assert_eq!(
             serde_json::from_str::<serde_json::Value>(&printed).unwrap(),
             json

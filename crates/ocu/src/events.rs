@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus_limits::{Bucket, Rate};
+use jaus_text::shortened;
 use jaus_view::Timestamp;
 
 use super::missing::Absence;
@@ -271,7 +272,7 @@ impl EventLog {
             vehicle,
             kind,
             level,
-            text: text.chars().take(Self::MOST_TEXT).collect(),
+            text: shortened(text, Self::MOST_TEXT).into_owned(),
         });
         if self.events.len() > Self::MOST {
             self.drop_one();

@@ -85,13 +85,9 @@ impl FromStr for TypeName {
     }
 }
 
-/// A text for an error message or the log: of bounded length, without control characters.
+/// A text for an error message or the log: of bounded length, in printable characters.
 pub(crate) fn shown(text: &str) -> String {
-    let printable = |c: char| match c.is_control() {
-        true => char::REPLACEMENT_CHARACTER,
-        false => c,
-    };
-    text.chars().take(100).map(printable).collect()
+    jaus_text::shortened(text, 100).into_owned()
 }
 
 /// Whether a name of a package or a field follows ROS's rules.

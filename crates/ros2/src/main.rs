@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
-use jaus::rights::Rules;
+use jaus::rights::{Rules, Table};
 use jaus_cli::runtime::{between, duration_within};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ros2::bridge::vehicle::Selection;
@@ -203,6 +203,9 @@ impl Ready for Flags {
 
     fn part(self) -> Result<impl Part, Failure> {
         self.check_components()?;
+        if let Some(rules) = &self.allow {
+            rules.verify(&Table::default()).map_err(Failure::of)?;
+        }
         let reports = self.reports()?;
         Bridge::new(self.settings(), self.topics(), reports, &self.session()).map_err(Failure::of)
     }

@@ -25,6 +25,7 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
         (&["--timeout", "3s"], "50ms to 2s"),
         (&["--component", "102.1.1"], "not a part of --vehicle 101"),
         (&["--allow", "drive"], "control=AUTHORITY"),
+        (&["--allow", "control=1 only=Drive"], "`Drive`"),
         (&["--report", "ReportWrenchEfort"], "ReportWrenchEffort?"),
         (
             &["--report", "ReportStatus", "--all-reports"],

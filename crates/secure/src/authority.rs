@@ -15,6 +15,7 @@ use webpki::{
 use crate::certificate::{
     Certificate, CertificateError, Defect, malformed, read, read_certificate, shown,
 };
+use crate::crypto;
 use crate::key::PublicKey;
 
 /// Why a peer is refused in the handshake.
@@ -144,7 +145,7 @@ impl Authority {
             .ok();
         parsed
             .verify_for_usage(
-                &[webpki::ring::ED25519],
+                &[crypto::ED25519],
                 std::slice::from_ref(&self.anchor),
                 &[],
                 now,

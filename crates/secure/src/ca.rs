@@ -3,7 +3,7 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `ca.key` | the private key, readable by its owner alone; it belongs on no vehicle |
+//! | `ca.key` | the private key, encrypted with a passphrase or readable by its owner alone; it belongs on no vehicle |
 //! | `ca.crt` | the certificate that nodes need (`authority`) |
 //! | `ca.crl` | the revocation list that nodes need (`revoked`) |
 //! | `issued` | a line for each issued certificate |
@@ -21,7 +21,6 @@ use rcgen::{
     DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyIdMethod, KeyUsagePurpose, PublicKeyData,
     RevokedCertParams, SanType, SerialNumber, SignatureAlgorithm, SigningKey,
 };
-use ring::rand::{SecureRandom as _, SystemRandom};
 use rustls::SignatureScheme;
 use rustls::pki_types::CertificateDer;
 use time::OffsetDateTime;
@@ -31,7 +30,7 @@ use crate::certificate::{
     Certificate, CertificateError, Defect, MOST_IDS, SCHEME, in_file, is_name, malformed,
     read_certificate,
 };
-use crate::key::{Key, KeyError, PublicKey, pem};
+use crate::key::{Key, KeyError, Passphrase, PublicKey, pem, random};
 pub use register::Issued;
 
 /// How long an authority's certificate is valid.
@@ -63,7 +62,7 @@ pub enum AuthorityError {
     /// The name is not usable.
     #[error(
         "`{}` cannot be a name: use 1 to 64 ASCII letters, digits and punctuation without `#`",
-        .0.escape_default()
+        jaus_text::visible(.0)
     )]
     Name(String),
     /// The certificate would have no ids, or too many.
@@ -106,17 +105,22 @@ pub struct CertificateAuthority {
 }
 
 impl CertificateAuthority {
-    /// Makes an authority with this name in a folder, which must exist.
+    /// Makes an authority with this name in a folder, which must exist. A passphrase encrypts its key.
     ///
     /// # Errors
     /// If the name is not usable, the folder has an authority already, or it cannot be written.
-    pub fn create(folder: &Path, name: &str, now: SystemTime) -> Result<Self, AuthorityError> {
+    pub fn create(
+        folder: &Path,
+        name: &str,
+        passphrase: Option<&Passphrase>,
+        now: SystemTime,
+    ) -> Result<Self, AuthorityError> {
         if !is_name(name) {
             return Err(AuthorityError::Name(name.to_owned()));
         }
         let authority = Self {
             folder: folder.to_owned(),
-            key: Key::create(&folder.join("ca.key"))?,
+            key: Key::create_sealed(&Self::key_path(folder), passphrase)?,
             name: name.to_owned(),
         };
         let mut params = authority.params();
@@ -132,16 +136,22 @@ impl CertificateAuthority {
         Ok(authority)
     }
 
-    /// Opens the authority in a folder.
+    /// The file of the key of the authority in a folder.
+    #[must_use]
+    pub fn key_path(folder: &Path) -> PathBuf {
+        folder.join("ca.key")
+    }
+
+    /// Opens the authority in a folder, whose key is plain or encrypted with this passphrase.
     ///
     /// # Errors
     /// If a file of it cannot be used.
-    pub fn open(folder: &Path) -> Result<Self, AuthorityError> {
+    pub fn open(folder: &Path, passphrase: Option<&Passphrase>) -> Result<Self, AuthorityError> {
         let path = folder.join("ca.crt");
         let name = common_name(&read_certificate(&path)?);
         Ok(Self {
             folder: folder.to_owned(),
-            key: Key::load(&folder.join("ca.key"))?,
+            key: Key::unseal(&Self::key_path(folder), passphrase)?,
             name: name.ok_or_else(|| malformed(&path, "certificate of an authority"))?,
         })
     }
@@ -180,7 +190,7 @@ impl CertificateAuthority {
     /// If the register cannot be read, or a file cannot be written.
     pub fn revoke(&self, which: &str, now: SystemTime) -> Result<Vec<Issued>, AuthorityError> {
         let _alone = self.lock()?;
-        let mut issued = self.issued()?;
+        let mut issued = Self::issued(&self.folder)?;
         let mut revoked = Vec::new();
         for it in &mut issued {
             let is_meant = it.name == which || it.serial == which;
@@ -197,16 +207,17 @@ impl CertificateAuthority {
         Ok(revoked)
     }
 
-    /// The certificates that it has issued, oldest first.
+    /// The certificates that the authority in a folder has issued, oldest first. They need no key.
     ///
     /// # Errors
-    /// If the register cannot be read.
-    pub fn issued(&self) -> Result<Vec<Issued>, AuthorityError> {
-        register::read(&self.register())
+    /// If the folder has no authority, or the register cannot be read.
+    pub fn issued(folder: &Path) -> Result<Vec<Issued>, AuthorityError> {
+        read_certificate(&folder.join("ca.crt"))?;
+        register::read(&register_path(folder))
     }
 
     fn register(&self) -> PathBuf {
-        self.folder.join("issued")
+        register_path(&self.folder)
     }
 
     /// Keeps other programs from changing the register until it is dropped.
@@ -263,6 +274,10 @@ impl CertificateAuthority {
     }
 }
 
+fn register_path(folder: &Path) -> PathBuf {
+    folder.join("issued")
+}
+
 fn check(request: &Request) -> Result<(), AuthorityError> {
     if !is_name(&request.name) {
         return Err(AuthorityError::Name(request.name.clone()));
@@ -295,10 +310,7 @@ fn common_name(der: &CertificateDer<'_>) -> Option<String> {
 
 /// A random serial number.
 fn serial() -> Result<SerialNumber, KeyError> {
-    let mut octets = [0; SERIAL];
-    SystemRandom::new()
-        .fill(&mut octets)
-        .map_err(|_| KeyError::NoRandomness)?;
+    let mut octets = random::<SERIAL>()?;
     // Positive, and of a fixed length.
     octets[0] = octets[0] & 0x7F | 0x40;
     Ok(SerialNumber::from_slice(&octets))

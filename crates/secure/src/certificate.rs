@@ -205,12 +205,7 @@ fn ids<'a>(names: impl Iterator<Item = &'a str>) -> Result<Vec<JausId>, Defect> 
     let ids: Vec<JausId> = texts
         .take(MOST_IDS + 1)
         .map(|text| {
-            let shown = || {
-                text.chars()
-                    .take(60)
-                    .flat_map(char::escape_default)
-                    .collect()
-            };
+            let shown = || jaus_text::shortened(text, 60).into_owned();
             text.parse().map_err(|_| Defect::Id(shown()))
         })
         .collect::<Result<_, _>>()?;

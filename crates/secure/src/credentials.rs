@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use jaus_files::Followed;
+use rustls::crypto::CryptoProvider;
 use rustls::pki_types::{CertificateDer, UnixTime};
 use rustls::sign::CertifiedKey;
 
 use crate::authority::{Authority, Rejection};
 use crate::certificate::{Certificate, CertificateError, shown};
+use crate::crypto;
 use crate::follow::{KEEPING, REFUSING, follow};
 use crate::key::{Key, PublicKey};
 use crate::trust::{Peer, TrustFile};
@@ -59,6 +61,7 @@ pub struct Credentials {
     authority: Option<Followed<Authority, CertificateError>>,
     /// The wall clock, in seconds since 1970.
     clock: Arc<AtomicU64>,
+    provider: Arc<CryptoProvider>,
 }
 
 /// A peer that has proved who it is.
@@ -83,7 +86,7 @@ impl Credentials {
     /// If the key file cannot be used.
     pub fn load(key: &Path, trust: TrustFile) -> Result<Self, CertificateError> {
         let path = key.to_owned();
-        let own = Followed::load(vec![path.clone()], move || Identity::load(&path, None))?;
+        let own = Followed::load(Key::files(key), move || Identity::load(&path, None))?;
         Ok(Self::new(own, trust, None))
     }
 
@@ -99,9 +102,9 @@ impl Credentials {
         now: SystemTime,
     ) -> Result<Self, CredentialsError> {
         let (key, path) = (key.to_owned(), files.certificate.clone());
-        let own = Followed::load(vec![key.clone(), path.clone()], move || {
-            Identity::load(&key, Some(&path))
-        })?;
+        let mut followed = Key::files(&key);
+        followed.push(path.clone());
+        let own = Followed::load(followed, move || Identity::load(&key, Some(&path)))?;
         let (certificate, revoked) = (files.authority.clone(), files.revoked.clone());
         let paths = [certificate.clone()].into_iter().chain(revoked.clone());
         let authority = Followed::load(paths.collect(), move || {
@@ -128,6 +131,7 @@ impl Credentials {
             trust,
             authority,
             clock: Arc::default(),
+            provider: crypto::provider(),
         }
     }
 
@@ -143,6 +147,11 @@ impl Credentials {
 
     pub(crate) fn own_key(&self) -> Key {
         self.own.get().key.clone()
+    }
+
+    /// What TLS is made of.
+    pub(crate) const fn provider(&self) -> &Arc<CryptoProvider> {
+        &self.provider
     }
 
     /// Whether the node uses certificates.
@@ -251,6 +260,13 @@ impl Credentials {
             own,
             ..self.clone()
         }
+    }
+
+    /// The same, with TLS of another library.
+    #[cfg(all(test, feature = "aws-lc", feature = "ring"))]
+    pub(crate) fn with_provider(self, provider: CryptoProvider) -> Self {
+        let provider = Arc::new(provider);
+        Self { provider, ..self }
     }
 
     /// Why the node's own certificate is not accepted now or will not be soon, and the remedy.

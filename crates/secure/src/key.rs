@@ -1,4 +1,11 @@
-//! A node's key: Ed25519, in a file that only its owner can read.
+//! A node's key: Ed25519, in a file that only its owner can read, or in a token.
+
+#[cfg(feature = "ca")]
+mod sealed;
+#[cfg(feature = "pkcs11")]
+mod token;
+#[cfg(feature = "pkcs11")]
+mod uri;
 
 use std::fmt;
 use std::fs;
@@ -10,12 +17,18 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use jaus_files::Readers;
-use ring::digest::{Digest, SHA256, digest};
-use ring::rand::SystemRandom;
-use ring::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 use rustls::SignatureScheme;
 use rustls::pki_types::{PrivatePkcs8KeyDer, SubjectPublicKeyInfoDer, pem::PemObject as _};
 use rustls::sign::SigningKey;
+use zeroize::Zeroizing;
+
+#[cfg(feature = "ca")]
+pub use sealed::Passphrase;
+
+use crate::crypto;
+use crate::crypto::digest::{Digest, SHA256, digest};
+use crate::crypto::rand::{SecureRandom as _, SystemRandom};
+use crate::crypto::signature::{ED25519, Ed25519KeyPair, UnparsedPublicKey};
 
 /// The octets before an Ed25519 key in a `SubjectPublicKeyInfo` (RFC 8410, section 4).
 const SPKI_PREFIX: [u8; 12] = [
@@ -23,6 +36,10 @@ const SPKI_PREFIX: [u8; 12] = [
 ];
 /// The longest key file, in octets.
 const LONGEST: u64 = 64 << 10;
+/// The label of a key file that is encrypted with a passphrase.
+const SEALED: &str = "ENCRYPTED PRIVATE KEY";
+/// How the URI of a key in a token begins.
+const TOKEN: &str = "pkcs11:";
 /// Characters of a line of PEM.
 const PEM_LINE: usize = 64;
 
@@ -47,12 +64,53 @@ pub enum KeyError {
     /// The file does not contain an Ed25519 key.
     #[error("the key file {} contains no Ed25519 private key in PKCS #8 PEM", .0.display())]
     Malformed(PathBuf),
+    /// The file is encrypted, and there is no passphrase.
+    #[error(
+        "the key file {} is encrypted: only that of an authority may be, because nobody is asked for \
+         a passphrase when a node starts",
+        .0.display()
+    )]
+    Sealed(PathBuf),
+    /// The file is encrypted with another passphrase.
+    #[error("the key file {} is encrypted with another passphrase", .0.display())]
+    WrongPassphrase(PathBuf),
+    /// A passphrase is too short or too long.
+    #[cfg(feature = "ca")]
+    #[error(
+        "the passphrase has {0} characters: choose {shortest} to {longest}",
+        shortest = Passphrase::SHORTEST,
+        longest = Passphrase::LONGEST
+    )]
+    PassphraseLength(usize),
+    /// The key in a token cannot be used.
+    #[error("the key {uri}: {what}")]
+    Token {
+        /// The key.
+        uri: String,
+        /// The reason.
+        what: String,
+    },
     /// The operating system provides no random numbers.
     #[error("the operating system provides no random numbers")]
     NoRandomness,
     /// A text is not a public key.
     #[error("`{0}` is not a public key: 44 characters of base64 are expected")]
     Text(String),
+}
+
+/// Without the feature, no key in a token can be used.
+#[cfg(not(feature = "pkcs11"))]
+mod token {
+    use super::{Key, KeyError, Path};
+
+    pub(super) fn load(path: &Path) -> Result<Key, KeyError> {
+        Err(KeyError::Token {
+            uri: path.display().to_string(),
+            what: "this program is built without the feature `pkcs11`".to_owned(),
+        })
+    }
+
+    pub(super) use load as create;
 }
 
 /// The private key of a node. It is never shown or logged.
@@ -63,43 +121,70 @@ pub struct Key {
 }
 
 impl Key {
-    /// Makes a new key and writes it to a file that only its owner can read.
+    /// Whether this names a key in a token, by a PKCS #11 URI (RFC 7512), and not a file.
+    #[must_use]
+    pub fn is_in_token(path: &Path) -> bool {
+        path.to_str().is_some_and(|it| it.starts_with(TOKEN))
+    }
+
+    /// Makes a new key and writes it to a file that only its owner can read. With a PKCS #11 URI in place
+    /// of a path, the token makes the key and keeps it.
     ///
     /// # Errors
-    /// If the file exists or cannot be written, or without random numbers.
+    /// If the file or key exists or cannot be written, or without random numbers.
     pub fn create(path: &Path) -> Result<Self, KeyError> {
-        let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
-            .map_err(|_| KeyError::NoRandomness)?;
-        let key = Self::from_pkcs8(document.as_ref())
-            .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
-        let text = pem("PRIVATE KEY", document.as_ref());
-        jaus_files::create(path, Readers::Owner, text.as_bytes()).map_err(|source| match source
-            .kind()
-        {
-            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
-            _ => in_file(path, source),
-        })?;
+        if Self::is_in_token(path) {
+            return token::create(path);
+        }
+        let (key, der) = Self::generate()?;
+        publish(path, &pem("PRIVATE KEY", &der))?;
         Ok(key)
     }
 
-    /// Reads a key file.
-    ///
-    /// # Errors
-    /// If the file cannot be read, can be read by other users too, or contains no Ed25519 key.
-    pub fn load(path: &Path) -> Result<Self, KeyError> {
-        Self::parse(&read(path)?).ok_or_else(|| KeyError::Malformed(path.to_owned()))
+    /// A new key, and its PKCS #8 encoding.
+    fn generate() -> Result<(Self, Zeroizing<Vec<u8>>), KeyError> {
+        let document = Ed25519KeyPair::generate_pkcs8(&SystemRandom::new())
+            .map_err(|_| KeyError::NoRandomness)?;
+        let der = Zeroizing::new(document.as_ref().to_vec());
+        let key = Self::from_pkcs8(&der).ok_or(KeyError::NoRandomness)?;
+        Ok((key, der))
     }
 
-    fn parse(pem: &[u8]) -> Option<Self> {
-        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok()?;
-        Self::from_pkcs8(der.secret_pkcs8_der())
+    /// Reads a key file, or finds the key in a token that a PKCS #11 URI names.
+    ///
+    /// # Errors
+    /// If the file cannot be read, can be read by other users too, is encrypted, or contains no Ed25519
+    /// key; if the token or its key cannot be used.
+    pub fn load(path: &Path) -> Result<Self, KeyError> {
+        if Self::is_in_token(path) {
+            return token::load(path);
+        }
+        Self::parse(path, &read(path)?)
+    }
+
+    fn parse(path: &Path, pem: &[u8]) -> Result<Self, KeyError> {
+        if is_sealed(pem) {
+            return Err(KeyError::Sealed(path.to_owned()));
+        }
+        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok();
+        der.and_then(|it| Self::from_pkcs8(it.secret_pkcs8_der()))
+            .ok_or_else(|| KeyError::Malformed(path.to_owned()))
     }
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
-        let der = PrivatePkcs8KeyDer::from(octets);
-        let signing = rustls::crypto::ring::sign::any_eddsa_type(&der).ok()?;
+        let der = PrivatePkcs8KeyDer::from(octets.to_vec());
+        let signing = crypto::provider()
+            .key_provider
+            .load_private_key(der.into())
+            .ok()?;
         let public = PublicKey::from_spki(signing.public_key()?.as_ref())?;
         Some(Self { signing, public })
+    }
+
+    /// The files that a key is read from: none for a key in a token.
+    pub(crate) fn files(path: &Path) -> Vec<PathBuf> {
+        let in_file = (!Self::is_in_token(path)).then(|| path.to_owned());
+        in_file.into_iter().collect()
     }
 
     /// The file of the key that is to replace the one in `path`: `node.key.next`.
@@ -118,7 +203,7 @@ impl Key {
     pub fn replace_by_next(path: &Path) -> Result<Self, KeyError> {
         let next = Self::next_path(path);
         let text = read(&next)?;
-        let key = Self::parse(&text).ok_or_else(|| KeyError::Malformed(next.clone()))?;
+        let key = Self::parse(&next, &text)?;
         jaus_files::replace(path, Readers::Owner, &text).map_err(|source| in_file(path, source))?;
         // Without the copy, because the next `--finish` would finish nothing.
         fs::remove_file(&next).map_err(|source| in_file(&next, source))?;
@@ -138,8 +223,11 @@ impl Key {
 
     /// A secret for another purpose, the same whenever the node runs with this key.
     pub(crate) fn secret_for(&self, purpose: &[u8]) -> Digest {
-        // Ed25519 signs everything, and the same text always in the same way.
-        digest(&SHA256, &self.sign(purpose).unwrap_or_default())
+        // Ed25519 signs the same text always in the same way. If a token does not sign, the secret is another
+        // one after the next start.
+        let signature = self.sign(purpose);
+        let signature = signature.or_else(|| random::<32>().ok().map(Vec::from));
+        digest(&SHA256, &signature.unwrap_or_default())
     }
 
     /// Signs a message; `None` if the key refuses to.
@@ -264,8 +352,33 @@ fn in_file(path: &Path, source: io::Error) -> KeyError {
     }
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, KeyError> {
-    jaus_files::read(path, Readers::Owner, LONGEST).map_err(|source| in_file(path, source))
+fn read(path: &Path) -> Result<Zeroizing<Vec<u8>>, KeyError> {
+    jaus_files::read(path, Readers::Owner, LONGEST)
+        .map(Zeroizing::new)
+        .map_err(|source| in_file(path, source))
+}
+
+/// Writes the file of a new key.
+fn publish(path: &Path, text: &str) -> Result<(), KeyError> {
+    jaus_files::create(path, Readers::Owner, text.as_bytes()).map_err(|source| {
+        match source.kind() {
+            io::ErrorKind::AlreadyExists => KeyError::Exists(path.to_owned()),
+            _ => in_file(path, source),
+        }
+    })
+}
+
+/// Whether the text of a key file is encrypted with a passphrase.
+fn is_sealed(pem: &[u8]) -> bool {
+    String::from_utf8_lossy(pem).contains(&format!("-----BEGIN {SEALED}-----"))
+}
+
+/// Random octets.
+pub(crate) fn random<const N: usize>() -> Result<[u8; N], KeyError> {
+    let mut octets = [0; N];
+    let filled = SystemRandom::new().fill(&mut octets);
+    filled.map_err(|_| KeyError::NoRandomness)?;
+    Ok(octets)
 }
 
 #[cfg(test)]

@@ -42,6 +42,7 @@ pub mod beacon;
 pub mod ca;
 mod certificate;
 mod credentials;
+mod crypto;
 pub mod edit;
 mod follow;
 mod key;
@@ -53,6 +54,9 @@ mod trust;
 pub use authority::{Authority, Rejection};
 pub use certificate::{Certificate, CertificateError, Defect};
 pub use credentials::{CertificateFiles, Credentials, CredentialsError};
+pub use crypto::crypto_library;
+#[cfg(feature = "ca")]
+pub use key::Passphrase;
 pub use key::{Fingerprint, Key, KeyError, PublicKey};
 pub use link::{Announce, OpenError, Reached, SecureLink, Settings};
 pub use trust::{Grant, Peer, Trust, TrustError, TrustFile};

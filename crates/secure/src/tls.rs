@@ -56,7 +56,7 @@ pub(crate) fn configs(
     credentials: &Credentials,
     refusals: &Refusals,
 ) -> (Arc<QuicServerConfig>, Arc<QuicClientConfig>) {
-    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let provider = credentials.provider().clone();
     let verifier = Arc::new(Verifier {
         credentials: credentials.clone(),
         refusals: refusals.clone(),
@@ -69,7 +69,7 @@ pub(crate) fn configs(
 
 #[expect(
     clippy::expect_used,
-    reason = "the provider `ring` has TLS 1.3 and the cipher suite of QUIC's first packets"
+    reason = "every provider has TLS 1.3 and the cipher suite of QUIC's first packets"
 )]
 fn server(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicServerConfig {
     let key = verifier.credentials.certified_key();
@@ -92,7 +92,7 @@ fn server(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicServerC
 
 #[expect(
     clippy::expect_used,
-    reason = "the provider `ring` has TLS 1.3 and the cipher suite of QUIC's first packets"
+    reason = "every provider has TLS 1.3 and the cipher suite of QUIC's first packets"
 )]
 fn client(provider: Arc<CryptoProvider>, verifier: Arc<Verifier>) -> QuicClientConfig {
     let key = verifier.credentials.certified_key();

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use jaus_text::is_unprintable;
+
 /// A group of test cases.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Suite {
@@ -115,7 +117,8 @@ fn element(xml: &mut String, depth: usize, text: &str) {
     let _ = writeln!(xml, "{:indent$}{text}", "", indent = 2 * depth);
 }
 
-/// Escapes text for XML: peers choose their names, and XML forbids most control characters.
+/// Escapes text for XML: peers choose their names, and XML forbids most control characters. What
+/// does not show itself is an escape such as `\u{1b}`.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -126,9 +129,7 @@ pub fn escaped(text: &str) -> String {
             '&' => escaped.push_str("&amp;"),
             '"' => escaped.push_str("&quot;"),
             '\n' | '\t' => escaped.push(character),
-            _ if character.is_control() || matches!(character, '\u{FFFE}' | '\u{FFFF}') => {
-                escaped.push('\u{FFFD}');
-            }
+            _ if is_unprintable(character) => escaped.extend(character.escape_unicode()),
             _ => escaped.push(character),
         }
     }
@@ -143,7 +144,7 @@ mod tests {
     fn what_a_peer_calls_itself_does_not_break_the_file() {
         assert_eq!(
             escaped("<Rover & \"Co\">\u{1b}[31m\n"),
-            "&lt;Rover &amp; &quot;Co&quot;&gt;\u{FFFD}[31m\n"
+            "&lt;Rover &amp; &quot;Co&quot;&gt;\\u{1b}[31m\n"
         );
     }
 

@@ -6,13 +6,15 @@
 //! reveal the style; decoding the whole message does.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
 
 use bytes::Bytes;
+use jaus_limits::{first_of_largest, quota_address};
 
 use jaus::address::JausId;
 use jaus::wire::{DataControl, Frame, Version, large};
 
-/// Limit of incomplete messages. Beyond it the oldest is dropped.
+/// Limit of incomplete messages. Beyond it the oldest of the network address with the most is dropped.
 const MOST_OPEN: usize = 64;
 /// Maximum size of a message. JAUS peers do not exceed some hundred kilobytes.
 const LONGEST: usize = 16 << 20;
@@ -27,6 +29,8 @@ pub(super) struct LargeMessages {
 
 #[derive(Debug)]
 struct Open {
+    /// The network address that it comes from, if known.
+    from: Option<IpAddr>,
     source: JausId,
     destination: JausId,
     version: Version,
@@ -54,9 +58,9 @@ impl LargeMessages {
         self.given_up + self.open.len() as u64
     }
 
-    /// Adds a fragment. Returns the message when it is complete.
-    pub(super) fn insert(&mut self, frame: &Frame) -> Option<Whole> {
-        let place = self.place_for(frame);
+    /// Adds a fragment from a network address. Returns the message when it is complete.
+    pub(super) fn insert(&mut self, from: Option<IpAddr>, frame: &Frame) -> Option<Whole> {
+        let place = self.place_for(from, frame);
         let open = &mut self.open[place];
         match frame.flags.data() {
             DataControl::First => open.first = Some(frame.sequence),
@@ -78,7 +82,7 @@ impl LargeMessages {
     }
 
     /// The entry for the fragment's message. A second first or last fragment starts a new message.
-    fn place_for(&mut self, frame: &Frame) -> usize {
+    fn place_for(&mut self, from: Option<IpAddr>, frame: &Frame) -> usize {
         let known = self.open.iter().position(|open| {
             (open.source, open.destination, open.version)
                 == (frame.source, frame.destination, frame.version)
@@ -97,10 +101,12 @@ impl LargeMessages {
             self.open.remove(place);
             self.given_up += 1;
         } else if self.open.len() == MOST_OPEN {
-            self.open.pop_front();
+            let place = first_of_largest(&self.open, |it| it.from);
+            place.and_then(|place| self.open.remove(place));
             self.given_up += 1;
         }
         self.open.push_back(Open {
+            from: from.map(quota_address),
             source: frame.source,
             destination: frame.destination,
             version: frame.version,
@@ -161,16 +167,19 @@ mod tests {
     fn fragments_in_any_order_make_the_message_even_across_the_wrap() {
         let mut large = LargeMessages::default();
         assert_eq!(
-            large.insert(&fragment(DataControl::Middle, 65_535, b"cd")),
+            large.insert(None, &fragment(DataControl::Middle, 65_535, b"cd")),
             None
         );
-        assert_eq!(large.insert(&fragment(DataControl::Last, 0, b"ef")), None);
         assert_eq!(
-            large.insert(&fragment(DataControl::Middle, 65_535, b"cd")),
+            large.insert(None, &fragment(DataControl::Last, 0, b"ef")),
+            None
+        );
+        assert_eq!(
+            large.insert(None, &fragment(DataControl::Middle, 65_535, b"cd")),
             None
         );
         let whole = large
-            .insert(&fragment(DataControl::First, 65_534, b"ab"))
+            .insert(None, &fragment(DataControl::First, 65_534, b"ab"))
             .unwrap();
         assert_eq!(whole.plain, b"abcdef"[..]);
         assert_eq!(whole.sequence, 65_534);
@@ -181,9 +190,9 @@ mod tests {
     #[test]
     fn a_code_in_every_fragment_is_offered_to_be_left_out() {
         let mut large = LargeMessages::default();
-        large.insert(&fragment(DataControl::First, 1, b"\x03\x4Bab"));
+        large.insert(None, &fragment(DataControl::First, 1, b"\x03\x4Bab"));
         let whole = large
-            .insert(&fragment(DataControl::Last, 2, b"\x03\x4Bcd"))
+            .insert(None, &fragment(DataControl::Last, 2, b"\x03\x4Bcd"))
             .unwrap();
         assert_eq!(whole.plain, b"\x03\x4Bab\x03\x4Bcd"[..]);
         assert_eq!(whole.without_repeated_code.unwrap(), b"\x03\x4Babcd"[..]);
@@ -192,10 +201,10 @@ mod tests {
     #[test]
     fn a_second_beginning_gives_up_the_first_message() {
         let mut large = LargeMessages::default();
-        large.insert(&fragment(DataControl::First, 1, b"ab"));
-        large.insert(&fragment(DataControl::First, 9, b"cd"));
+        large.insert(None, &fragment(DataControl::First, 1, b"ab"));
+        large.insert(None, &fragment(DataControl::First, 9, b"cd"));
         let whole = large
-            .insert(&fragment(DataControl::Last, 10, b"ef"))
+            .insert(None, &fragment(DataControl::Last, 10, b"ef"))
             .unwrap();
         assert_eq!(whole.plain, b"cdef"[..]);
         assert_eq!(large.incomplete(), 1);
@@ -207,9 +216,29 @@ mod tests {
         for component in 0..=255 {
             let mut frame = fragment(DataControl::First, 1, b"ab");
             frame.source = JausId::new(1, 1, component);
-            large.insert(&frame);
+            large.insert(None, &frame);
         }
         assert_eq!(large.open.len(), MOST_OPEN);
         assert_eq!(large.incomplete(), 256);
+    }
+
+    #[test]
+    fn a_flood_of_one_address_does_not_drop_the_message_of_another() {
+        let mut large = LargeMessages::default();
+        let [other, flood] = [1, 66].map(|host| Some(IpAddr::from([10, 0, 0, host])));
+        assert_eq!(
+            large.insert(other, &fragment(DataControl::First, 1, b"\x03\x4Bab")),
+            None
+        );
+        for component in 0..=255 {
+            let mut frame = fragment(DataControl::First, 1, b"ab");
+            frame.source = JausId::new(66, 1, component);
+            large.insert(flood, &frame);
+        }
+        assert!(
+            large
+                .insert(other, &fragment(DataControl::Last, 2, b"cd"))
+                .is_some()
+        );
     }
 }

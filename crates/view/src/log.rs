@@ -1,5 +1,7 @@
 //! Decoding of the messages in a capture's datagrams.
 
+use std::net::IpAddr;
+
 use bytes::Bytes;
 use serde_json::{Map, Value as Json};
 
@@ -10,6 +12,13 @@ use super::line::{Content, Envelope, Header, Line};
 use super::network::Datagram;
 use super::time::Timestamp;
 use jaus::wire::{self, DataControl, Frame, Version, judp};
+
+/// When a message arrived, and from which network address, as far as known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrival {
+    pub(super) time: Option<Timestamp>,
+    pub(super) from: Option<IpAddr>,
+}
 
 /// Decodes datagrams one by one and yields a [`Line`] for every message.
 ///
@@ -70,7 +79,11 @@ impl<'d> MessageLog<'d> {
     pub fn read(&mut self, time: Option<Timestamp>, datagram: &Datagram<'_>) -> Vec<Line<'d>> {
         let mut lines = Vec::new();
         let octets = Bytes::copy_from_slice(&datagram.payload);
-        if let Err(error) = self.messages(time, octets, &mut lines) {
+        let arrival = Arrival {
+            time,
+            from: Some(datagram.source.ip()),
+        };
+        if let Err(error) = self.messages(arrival, octets, &mut lines) {
             let envelope = Envelope { time, header: None };
             let sentence = match datagram.missing {
                 0 => error.to_string(),
@@ -89,7 +102,7 @@ impl<'d> MessageLog<'d> {
     /// Adds the lines of a datagram's messages.
     fn messages(
         &mut self,
-        time: Option<Timestamp>,
+        arrival: Arrival,
         octets: Bytes,
         lines: &mut Vec<Line<'d>>,
     ) -> Result<(), wire::Error> {
@@ -105,40 +118,36 @@ impl<'d> MessageLog<'d> {
                 self.stale_octets += rest as u64;
                 return Ok(());
             };
-            self.message(time, &frame, lines);
+            self.message(arrival, &frame, lines);
         }
     }
 
     /// Adds the line of a message, and of a large message that it completes.
-    fn message(&mut self, time: Option<Timestamp>, frame: &Frame, lines: &mut Vec<Line<'d>>) {
+    fn message(&mut self, arrival: Arrival, frame: &Frame, lines: &mut Vec<Line<'d>>) {
         let envelope = Envelope {
-            time,
+            time: arrival.time,
             header: Some(Header::of(frame)),
         };
         if frame.is_acknowledgement() {
             lines.push(self.bare(envelope, None, Content::Empty));
         } else if frame.flags.data() != DataControl::Single {
             lines.push(self.fragment(envelope, frame));
-            lines.extend(self.whole(time, frame));
+            lines.extend(self.whole(arrival, frame));
         } else {
             lines.push(self.line(envelope, &frame.payload));
         }
     }
 
     /// The line of a complete message. `None` for acknowledgements and incomplete messages.
-    pub(super) fn whole_message(
-        &mut self,
-        time: Option<Timestamp>,
-        frame: &Frame,
-    ) -> Option<Line<'d>> {
+    pub(super) fn whole_message(&mut self, arrival: Arrival, frame: &Frame) -> Option<Line<'d>> {
         if frame.is_acknowledgement() {
             return None;
         }
         if frame.flags.data() != DataControl::Single {
-            return self.whole(time, frame);
+            return self.whole(arrival, frame);
         }
         let envelope = Envelope {
-            time,
+            time: arrival.time,
             header: Some(Header::of(frame)),
         };
         Some(self.line(envelope, &frame.payload))
@@ -192,10 +201,10 @@ impl<'d> MessageLog<'d> {
     }
 
     /// The line of the large message that this fragment completes.
-    fn whole(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Line<'d>> {
-        let whole = self.large.insert(frame)?;
+    fn whole(&mut self, arrival: Arrival, frame: &Frame) -> Option<Line<'d>> {
+        let whole = self.large.insert(arrival.from, frame)?;
         let envelope = Envelope {
-            time,
+            time: arrival.time,
             header: Some(Header {
                 data: "whole",
                 sequence: whole.sequence,

@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 use jaus::address::JausId;
 use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
 use jaus::service::ComponentEntry;
+use jaus_text::quoted;
 use serde_json::{Map, Value as Json, json};
-
-use super::words::quoted;
 
 /// Formats the tree as indented lines, without the observing component `left_out`; with the colours of
 /// a terminal on demand.

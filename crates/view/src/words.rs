@@ -1,7 +1,4 @@
-//! Text for people: the fields of a message, with units and names of values, and text from the
-//! network.
-
-use std::borrow::Cow;
+//! Text for people: the fields of a message, with units and names of values.
 
 use bytes::Bytes;
 use jsidl::explain::{Kind, Row, explain_as};
@@ -101,26 +98,6 @@ fn time_stamp(sub_fields: &[Row]) -> Option<String> {
     ))
 }
 
-/// Text from the network for a line of output: unchanged, or if a character of it
-/// [disturbs a terminal](disturbs_terminal), in double quotes with those characters escaped. No name can
-/// begin a new line or move the cursor.
-#[must_use]
-pub fn quoted(text: &str) -> Cow<'_, str> {
-    match text.contains(disturbs_terminal) {
-        true => format!("{text:?}").into(),
-        false => text.into(),
-    }
-}
-
-/// Whether a character could do more on a terminal than show itself: begin a line, move the cursor,
-/// or change the direction of the text after it, so that a name reads as another one.
-#[must_use]
-pub fn disturbs_terminal(c: char) -> bool {
-    let changes_direction = || matches!(c, '\u{061C}' | '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
-    let separates_lines = || matches!(c, '\u{2028}' | '\u{2029}');
-    c.is_control() || changes_direction() || separates_lines()
-}
-
 /// The symbol of a unit; its name if it has none.
 #[must_use]
 pub fn symbol(units: &str) -> &str {
@@ -147,23 +124,5 @@ pub fn symbol(units: &str) -> &str {
         "rotations per minute" => "rpm",
         "liter" => "l",
         other => other,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_cannot_begin_a_line_or_move_the_cursor() {
-        for (text, shown) in [
-            ("urn:jaus:jss:core:Events", "urn:jaus:jss:core:Events"),
-            ("Müller \"2\" · 5 µs", "Müller \"2\" · 5 µs"),
-            ("a\nfake line", r#""a\nfake line""#),
-            ("\x1b]0;t\x07\r\u{9b}", r#""\u{1b}]0;t\u{7}\r\u{9b}""#),
-            ("\u{202e}revoR\u{2028}", r#""\u{202e}revoR\u{2028}""#),
-        ] {
-            assert_eq!(quoted(text), shown);
-        }
     }
 }

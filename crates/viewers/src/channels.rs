@@ -1,8 +1,11 @@
 //! Channels by source and message, and their samples.
 
 use std::collections::BTreeMap;
+use std::net::IpAddr;
 use std::sync::Arc;
+use std::time::Duration;
 
+use jaus_limits::{Displacing, Room, quota_address};
 use jaus_view::{Dictionary, Entry, Timestamp};
 use serde_json::{Map, Value as Json};
 
@@ -10,15 +13,18 @@ use crate::schema::{MessageSchema, Schema};
 use crate::topic::topic;
 use crate::well_known;
 
-/// Limit of channels. The messages of further ones are counted.
+/// Limit of channels. The messages of further ones are counted. One network address gets half of them
+/// at most.
 pub const MOST_CHANNELS: usize = 4096;
+/// A live channel without samples for this time gives way to a new one.
+const IDLE: Duration = Duration::from_secs(10);
 /// The code of events.
 const EVENT: &str = "41F1";
 
 /// One stream of samples with a common schema.
 #[derive(Debug)]
 pub struct Channel {
-    /// Its number, from 0.
+    /// Its number, from 0, which no later channel gets.
     pub index: usize,
     /// Its topic, for example `/jaus/101/1/40/ReportLocalPose`.
     pub topic: String,
@@ -52,18 +58,31 @@ pub struct Sample {
 ///     "service":"urn:jaus:jss:core:Management","body":{"Status":"STANDBY","Reserved":0}}"#;
 /// let entry = stream.read_json(line)?.expect("every message matches");
 /// let mut channels = Channels::new(&dictionary);
-/// let samples = channels.handle_entry(&entry, 0);
-/// assert_eq!(channels.all()[samples[0].channel].topic, "/jaus/101/1/1/ReportStatus");
+/// let samples = channels.handle_entry(&entry, None, 0);
+/// let channel = channels.get(samples[0].channel).expect("the sample's channel");
+/// assert_eq!(channel.topic, "/jaus/101/1/1/ReportStatus");
 /// assert_eq!(samples[0].value["Status"], 2);
 /// # Ok::<(), String>(())
 /// ```
 #[derive(Debug)]
 pub struct Channels<'d> {
     dictionary: &'d Dictionary,
-    channels: Vec<Arc<Channel>>,
+    channels: BTreeMap<usize, Arc<Channel>>,
+    /// The number of the next channel.
+    next: usize,
+    /// The channels by the network address of their source; `None` is this host.
+    places: Displacing<Option<IpAddr>, usize>,
     by_topic: BTreeMap<String, usize>,
     definitions: BTreeMap<DefinitionKey, Arc<Definition>>,
     left_out: u64,
+}
+
+/// The origin and the time of a message.
+#[derive(Debug, Clone, Copy)]
+struct Arrival {
+    from: Option<IpAddr>,
+    /// Nanoseconds since 1970.
+    time: u64,
 }
 
 /// Service, version if it is not the usual one, and code.
@@ -77,33 +96,62 @@ struct Definition {
 }
 
 impl<'d> Channels<'d> {
-    /// Starts without channels. Schemas come from the library of `dictionary`.
+    /// Starts without channels, and keeps each one. Schemas come from the library of `dictionary`.
     #[must_use]
     pub fn new(dictionary: &'d Dictionary) -> Self {
+        Self::displacing(dictionary, Duration::MAX)
+    }
+
+    /// The same for live viewers: when all channels are taken, a new one replaces one that was without
+    /// samples for 10 s.
+    #[must_use]
+    pub fn live(dictionary: &'d Dictionary) -> Self {
+        Self::displacing(dictionary, IDLE)
+    }
+
+    fn displacing(dictionary: &'d Dictionary, idle: Duration) -> Self {
         Self {
             dictionary,
-            channels: Vec::new(),
+            channels: BTreeMap::new(),
+            next: 0,
+            places: Displacing::new(MOST_CHANNELS, idle),
             by_topic: BTreeMap::new(),
             definitions: BTreeMap::new(),
             left_out: 0,
         }
     }
 
-    /// All channels so far.
+    /// All channels, by their numbers.
     #[must_use]
-    pub fn all(&self) -> &[Arc<Channel>] {
+    pub const fn all(&self) -> &BTreeMap<usize, Arc<Channel>> {
         &self.channels
     }
 
-    /// Number of samples left out, because there are [`MOST_CHANNELS`] already.
+    /// A channel by its number.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<&Arc<Channel>> {
+        self.channels.get(&index)
+    }
+
+    /// Number of channels that were opened so far.
+    #[must_use]
+    pub(crate) const fn opened(&self) -> usize {
+        self.next
+    }
+
+    /// Number of samples left out for want of a channel: of [`MOST_CHANNELS`], or of the share of their
+    /// network address.
     #[must_use]
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// The samples of a message of this time, in nanoseconds since 1970. The first is the message
-    /// itself; others have schemas of Foxglove.
-    pub fn handle_entry(&mut self, entry: &Entry, time: u64) -> Vec<Sample> {
+    /// The samples of a message from a network address, at a time in nanoseconds since 1970. The first is
+    /// the message itself; others have schemas of Foxglove. `None` is this host, or an origin without an
+    /// address.
+    pub fn handle_entry(&mut self, entry: &Entry, from: Option<IpAddr>, time: u64) -> Vec<Sample> {
+        let from = from.map(quota_address);
+        let arrival = Arrival { from, time };
         let is_event = entry.text("code") == Some(EVENT);
         let object = match entry.carried() {
             Some(carried) if is_event => carried,
@@ -115,7 +163,7 @@ impl<'d> Channels<'d> {
         let mut samples = Vec::new();
         if let Some((topic, definition)) = self.definition(source, object) {
             let value = definition.conversion.convert(body);
-            self.add(topic, &definition.schema, value, time, &mut samples);
+            self.add(topic, &definition.schema, value, arrival, &mut samples);
         }
         let text = |key: &str| object.get(key).and_then(Json::as_str).unwrap_or_default();
         let message = well_known::Message {
@@ -130,7 +178,7 @@ impl<'d> Channels<'d> {
                 sample.topic,
                 &sample.schema,
                 sample.value,
-                time,
+                arrival,
                 &mut samples,
             );
         }
@@ -142,34 +190,52 @@ impl<'d> Channels<'d> {
         topic: String,
         schema: &Arc<Schema>,
         value: Json,
-        time: u64,
+        arrival: Arrival,
         samples: &mut Vec<Sample>,
     ) {
+        let now = Duration::from_nanos(arrival.time);
         let known = self.by_topic.get(&topic).copied();
-        let channel = match known {
-            Some(channel) => channel,
-            None if self.channels.len() < MOST_CHANNELS => self.open(topic, schema),
-            None => {
-                self.left_out += 1;
-                return;
-            }
+        if let Some(channel) = known {
+            self.places.touch(channel, now);
+        }
+        let Some(channel) = known.or_else(|| self.open(topic, schema, arrival)) else {
+            self.left_out += 1;
+            return;
         };
         samples.push(Sample {
             channel,
-            time,
+            time: arrival.time,
             value,
         });
     }
 
-    fn open(&mut self, topic: String, schema: &Arc<Schema>) -> usize {
-        let index = self.channels.len();
+    /// Opens a channel, in place of an idle one if need be; `None` if there is no room.
+    fn open(&mut self, topic: String, schema: &Arc<Schema>, arrival: Arrival) -> Option<usize> {
+        let now = Duration::from_nanos(arrival.time);
+        match self.places.room(arrival.from, now) {
+            Room::Free => {}
+            Room::InPlaceOf(idle) => self.close(idle),
+            Room::None => return None,
+        }
+        let index = self.next;
+        self.next += 1;
+        self.places.insert(index, arrival.from, now);
         self.by_topic.insert(topic.clone(), index);
-        self.channels.push(Arc::new(Channel {
+        let schema = schema.clone();
+        let channel = Channel {
             index,
             topic,
-            schema: schema.clone(),
-        }));
-        index
+            schema,
+        };
+        self.channels.insert(index, Arc::new(channel));
+        Some(index)
+    }
+
+    fn close(&mut self, index: usize) {
+        self.places.remove(index);
+        if let Some(channel) = self.channels.remove(&index) {
+            self.by_topic.remove(&channel.topic);
+        }
     }
 
     /// The topic and the definition of a message; `None` if it has no definition.
@@ -202,8 +268,8 @@ impl<'d> Channels<'d> {
         };
         let mut topic = topic(source, message);
         // Another layout with the same name: another version, or another service.
-        let taken = self.by_topic.get(&topic);
-        if taken.is_some_and(|&taken| self.channels[taken].schema != definition.schema) {
+        let taken = self.by_topic.get(&topic).and_then(|&it| self.get(it));
+        if taken.is_some_and(|taken| taken.schema != definition.schema) {
             topic = format!("{topic}/{}", definition.schema.name);
         }
         Some((topic, definition))
@@ -256,14 +322,15 @@ mod tests {
         let dictionary = Dictionary::new().with_catalogue();
         let mut channels = Channels::new(&dictionary);
         for source in ["101.1.1", "101.1.2", "101.1.1"] {
-            let samples = channels.handle_entry(&entry(&dictionary, &status(source, None)), 7);
+            let samples =
+                channels.handle_entry(&entry(&dictionary, &status(source, None)), None, 7);
             assert_eq!((samples.len(), samples[0].time), (1, 7));
         }
-        let topics: Vec<_> = channels.all().iter().map(|it| &*it.topic).collect();
+        let topics: Vec<_> = channels.all().values().map(|it| &*it.topic).collect();
         let expected = ["/jaus/101/1/1/ReportStatus", "/jaus/101/1/2/ReportStatus"];
         assert_eq!(topics, expected);
         assert_eq!(
-            channels.all()[0].schema.name,
+            channels.all()[&0].schema.name,
             "core.Management.ReportStatus"
         );
     }
@@ -274,9 +341,9 @@ mod tests {
         let mut channels = Channels::new(&dictionary);
         for version in [None, Some("1.0"), None] {
             let status = status("101.1.1", version);
-            channels.handle_entry(&entry(&dictionary, &status), 0);
+            channels.handle_entry(&entry(&dictionary, &status), None, 0);
         }
-        let topics: Vec<_> = channels.all().iter().map(|it| &*it.topic).collect();
+        let topics: Vec<_> = channels.all().values().map(|it| &*it.topic).collect();
         let expected = [
             "/jaus/101/1/1/ReportStatus",
             "/jaus/101/1/1/ReportStatus/core.Management.1.0.ReportStatus",
@@ -294,22 +361,86 @@ mod tests {
             "body": { "EventID": 1, "SequenceNumber": 0, "ReportMessage": "0240" },
         });
         event["carries"] = status("", None);
-        let samples = channels.handle_entry(&entry(&dictionary, &event), 0);
+        let samples = channels.handle_entry(&entry(&dictionary, &event), None, 0);
         assert_eq!(samples[0].value["Status"], 1);
-        assert_eq!(channels.all()[0].topic, "/jaus/101/1/1/ReportStatus");
+        assert_eq!(channels.all()[&0].topic, "/jaus/101/1/1/ReportStatus");
+    }
+
+    /// Messages of this many components from a network address; returns how many had a channel.
+    fn flood(
+        channels: &mut Channels<'_>,
+        dictionary: &Dictionary,
+        (from, subsystem): (&str, u32),
+        many: u32,
+        time: Duration,
+    ) -> usize {
+        let from = Some(from.parse().unwrap());
+        let time = u64::try_from(time.as_nanos()).unwrap();
+        let sources = (0..many).map(|it| format!("{subsystem}.{}.{}", it / 200 + 1, it % 200 + 1));
+        sources
+            .map(|source| entry(dictionary, &status(&source, None)))
+            .filter(|it| !channels.handle_entry(it, from, time).is_empty())
+            .count()
     }
 
     #[test]
-    fn channels_are_bounded_and_what_is_left_out_is_counted() {
+    fn an_address_that_invents_sources_leaves_channels_to_others() {
         let dictionary = Dictionary::new().with_catalogue();
         let mut channels = Channels::new(&dictionary);
-        for source in 0..MOST_CHANNELS + 10 {
-            let source = format!("{}.{}.1", source / 200 + 1, source % 200 + 1);
-            channels.handle_entry(&entry(&dictionary, &status(&source, None)), 0);
+        let second = Duration::from_secs;
+        let flooded = flood(
+            &mut channels,
+            &dictionary,
+            ("10.0.0.66", 66),
+            4200,
+            second(0),
+        );
+        assert_eq!(flooded, MOST_CHANNELS / 2);
+        assert_eq!(channels.left_out(), 4200 - flooded as u64);
+        let vehicle = ("10.0.0.1", 101);
+        assert_eq!(
+            flood(&mut channels, &dictionary, vehicle, 100, second(1)),
+            100
+        );
+        assert_eq!(
+            flood(&mut channels, &dictionary, vehicle, 100, second(60)),
+            100,
+            "known"
+        );
+        assert!(channels.all().len() <= MOST_CHANNELS);
+    }
+
+    #[test]
+    fn live_channels_in_use_stay_and_idle_ones_give_way_however_many_addresses_are_forged() {
+        let dictionary = Dictionary::new().with_catalogue();
+        let mut channels = Channels::live(&dictionary);
+        let vehicle = ("10.0.0.1", 101);
+        let second = Duration::from_secs;
+        assert_eq!(
+            flood(&mut channels, &dictionary, vehicle, 50, second(0)),
+            50
+        );
+        for address in 0..200 {
+            let forged = (&*format!("10.1.{address}.1"), 1000 + address);
+            flood(&mut channels, &dictionary, forged, 300, second(5));
         }
         assert_eq!(channels.all().len(), MOST_CHANNELS);
-        assert_eq!(channels.left_out(), 10);
-        let known = entry(&dictionary, &status("1.1.1", None));
-        assert_eq!(channels.handle_entry(&known, 0).len(), 1);
+        assert_eq!(
+            flood(&mut channels, &dictionary, vehicle, 50, second(14)),
+            50
+        );
+        let newcomer = ("10.0.0.2", 102);
+        assert_eq!(
+            flood(&mut channels, &dictionary, newcomer, 50, second(14)),
+            0
+        );
+        assert_eq!(
+            flood(&mut channels, &dictionary, newcomer, 50, second(16)),
+            50
+        );
+        assert_eq!(channels.all().len(), MOST_CHANNELS);
+        let topics: Vec<_> = channels.all().values().map(|it| &*it.topic).collect();
+        let of = |start: &str| topics.iter().filter(|it| it.starts_with(start)).count();
+        assert_eq!((of("/jaus/101/"), of("/jaus/102/")), (50, 50));
     }
 }

@@ -120,7 +120,8 @@ impl<'d, W: Write> McapRecorder<'d, W> {
         self.counts.frames += 1;
         for datagram in self.network.handle_frame(frame) {
             for entry in self.messages.read_datagram(frame.time, &datagram) {
-                for sample in self.channels.handle_entry(&entry, self.time) {
+                let from = Some(datagram.source.ip());
+                for sample in self.channels.handle_entry(&entry, from, self.time) {
                     self.write_sample(&sample)?;
                 }
             }
@@ -150,7 +151,7 @@ impl<'d, W: Write> McapRecorder<'d, W> {
     /// The number of a channel in the file. Channels are written in the order in which they open.
     fn number(&mut self, channel: usize) -> io::Result<u16> {
         while self.numbers.len() <= channel
-            && let Some(next) = self.channels.all().get(self.numbers.len())
+            && let Some(next) = self.channels.get(self.numbers.len())
         {
             let Channel { topic, schema, .. } = &**next;
             let number = add_channel(&mut self.writer, topic, schema)?;

@@ -79,6 +79,11 @@ pub(crate) fn advertise<'c>(channels: impl IntoIterator<Item = &'c Channel>) -> 
     json!({ "op": "advertise", "channels": channels }).to_string()
 }
 
+/// Announces that channels are closed.
+pub(crate) fn unadvertise(channels: &[usize]) -> String {
+    json!({ "op": "unadvertise", "channelIds": channels }).to_string()
+}
+
 /// A warning that the client shows its user.
 pub(crate) fn warning(message: &str) -> String {
     json!({ "op": "status", "level": 1, "message": message }).to_string()

@@ -6,8 +6,10 @@
 //!
 //! | JSON view of a message | for viewers |
 //! |---|---|
-//! | a name or a number | the number, with the names in the schema (`oneOf`); others may occur |
-//! | `"NaN"`, `"Infinity"` | left out |
+//! | a name or a number of an enumeration | the number, with the names in the schema (`oneOf`) |
+//! | a name, or a number in a range | the number, with the names in the schema (`anyOf`) |
+//! | `"NaN"`, `"Infinity"`, a number that an enumeration does not have | left out |
+//! | an array with such an element | left out, because an element without a value would move the others |
 //! | octets in hexadecimal | base64 (`contentEncoding`) |
 //! | text, or `{"hex": …}` | text |
 //! | one of several alternatives | an object with the members of all, of which one is there |
@@ -43,9 +45,13 @@ pub(crate) struct MessageSchema {
 /// What a value is converted to.
 #[derive(Debug)]
 enum Form {
+    Integer,
     Number,
-    /// A number that may have a name.
-    Named(BTreeMap<String, i64>),
+    /// An integer that may have a name. With `closed`, it has one.
+    Named {
+        names: BTreeMap<String, i64>,
+        closed: bool,
+    },
     Text,
     Octets,
     Object(BTreeMap<String, Self>),
@@ -93,10 +99,15 @@ impl Form {
     /// The value in this form; `None` if it cannot be represented.
     fn convert(&self, value: &Json) -> Option<Json> {
         match self {
+            Self::Integer => is_integer(value).then(|| value.clone()),
             Self::Number => value.is_number().then(|| value.clone()),
-            Self::Named(names) => match value.as_str() {
+            Self::Named { names, closed } => match value.as_str() {
                 Some(name) => names.get(name).map(|&number| number.into()),
-                None => value.is_number().then(|| value.clone()),
+                None => {
+                    let has_name = || names.values().any(|&it| value.as_i64() == Some(it));
+                    let fits = is_integer(value) && (!closed || has_name());
+                    fits.then(|| value.clone())
+                }
             },
             Self::Text => {
                 let text = value.as_str().or_else(|| value.get("hex")?.as_str())?;
@@ -116,22 +127,25 @@ impl Form {
             }
             Self::List(element) => {
                 let elements = value.as_array()?.iter();
-                // Leaving one out would move the others.
-                let elements = elements.map(|it| element.convert(it).unwrap_or_default());
-                Some(elements.collect())
+                elements.map(|it| element.convert(it)).collect()
             }
             Self::Nested(element) => {
                 let mut elements = Vec::new();
-                element.flatten(value, &mut elements);
+                element.flatten(value, &mut elements)?;
                 Some(elements.into())
             }
         }
     }
 
-    fn flatten(&self, value: &Json, into: &mut Vec<Json>) {
+    fn flatten(&self, value: &Json, into: &mut Vec<Json>) -> Option<()> {
         match value.as_array() {
-            Some(values) => values.iter().for_each(|value| self.flatten(value, into)),
-            None => into.push(self.convert(value).unwrap_or_default()),
+            Some(values) => values
+                .iter()
+                .try_for_each(|value| self.flatten(value, into)),
+            None => {
+                into.push(self.convert(value)?);
+                Some(())
+            }
         }
     }
 }
@@ -166,7 +180,7 @@ fn narrow_type(schema: &Json) -> (Json, Form) {
             Form::Octets,
         ),
         "string" => (json!({ "type": "string" }), Form::Text),
-        "integer" => (json!({ "type": "integer" }), Form::Number),
+        "integer" => (json!({ "type": "integer" }), Form::Integer),
         // Numbers, and constants, which the generator gives no type.
         _ => match schema["const"].is_string() {
             true => (json!({ "type": "string" }), Form::Text),
@@ -183,7 +197,7 @@ fn narrow_alternatives(schema: &Json, alternatives: &[Json]) -> (Json, Form) {
         return narrow(present);
     }
     if let Some(listed) = schema["x-values"].as_array() {
-        return named(listed);
+        return named(listed, schema.get("x-ranges").is_some());
     }
     if of_type("string").is_some() {
         return (json!({ "type": "string" }), Form::Text);
@@ -212,8 +226,15 @@ fn narrow_members<'a>(members: impl Iterator<Item = (&'a String, &'a Json)>) -> 
     (object(&properties), Form::Object(forms))
 }
 
+fn is_integer(value: &Json) -> bool {
+    value.is_i64() || value.is_u64()
+}
+
 /// A number with names, which are listed as `"5 EMERGENCY"`. Of two equal names the first counts.
-fn named(listed: &[Json]) -> (Json, Form) {
+/// `has_others` says whether the definition has ranges, too.
+///
+/// Viewers show the names of `oneOf`, in which they accept no more than constants.
+fn named(listed: &[Json], has_others: bool) -> (Json, Form) {
     let mut names = BTreeMap::new();
     let mut constants = Vec::new();
     let split = |it: &Json| {
@@ -226,10 +247,14 @@ fn named(listed: &[Json]) -> (Json, Form) {
     }
     let mut schema = json!({ "type": "integer" });
     // A single name is that of a special value among others, such as a timeout of 0.
-    if constants.len() > 1 {
+    let closed = constants.len() > 1 && !has_others;
+    if closed {
         schema["oneOf"] = constants.into();
+    } else if constants.len() > 1 {
+        constants.push(json!({ "type": "integer" }));
+        schema["anyOf"] = constants.into();
     }
-    (schema, Form::Named(names))
+    (schema, Form::Named { names, closed })
 }
 
 fn object(properties: &Map<String, Json>) -> Json {
@@ -308,7 +333,26 @@ mod tests {
         let expected = json!({ "Status": 5, "Reserved": 0 });
         assert_eq!(convert("EMERGENCY".into()), expected);
         assert_eq!(convert(5.into()), expected);
-        assert_eq!(convert("no such name".into()), json!({ "Reserved": 0 }));
+        for undefined in [Json::from("no such name"), 6.into(), 255.into()] {
+            assert_eq!(convert(undefined), json!({ "Reserved": 0 }));
+        }
+    }
+
+    #[test]
+    fn a_number_with_names_and_ranges_may_be_any() {
+        let mut schema = json!({
+            "anyOf": [{ "type": "integer" }, { "enum": ["ANY", "NONE"] }],
+            "x-values": ["0 NONE", "255 ANY"],
+        });
+        let (closed, form) = narrow(&schema);
+        assert_eq!(closed["oneOf"][1]["const"], 255);
+        assert_eq!(form.convert(&json!(1)), None);
+        schema["x-ranges"] = json!(["1 to 254"]);
+        let (open, form) = narrow(&schema);
+        assert_eq!(open.get("oneOf"), None);
+        assert_eq!(open["anyOf"][2], json!({ "type": "integer" }));
+        assert_eq!(form.convert(&json!(1)), Some(json!(1)));
+        assert_eq!(form.convert(&json!("ANY")), Some(json!(255)));
     }
 
     #[test]
@@ -352,6 +396,7 @@ mod tests {
             form.convert(&json!([[1, 2], [3, 4]])),
             Some(json!([1, 2, 3, 4]))
         );
+        assert_eq!(form.convert(&json!([[1, "NaN"], [3, 4]])), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::Config;
-use jaus::rights::{Acceptance, Grant};
+use jaus::rights::{Acceptance, Grant, Table};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_vehicle::parts::Part;
 use jaus_zenoh::key::Prefix;
@@ -88,6 +88,8 @@ impl Ready for Flags {
         settings.prefix = self.prefix;
         if !self.accept.is_empty() {
             settings.accept = Acceptance::new(self.accept);
+            let names = settings.accept.verify(&Table::default());
+            names.map_err(Failure::of)?;
         }
         settings.trusts_network = self.trust_network;
         settings.offer = self.offer;

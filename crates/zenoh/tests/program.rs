@@ -29,6 +29,7 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
         (&["--zenoh-config", "/nowhere.json5"], "/nowhere.json5"),
         (&["--accept", "60 drive"], "control=AUTHORITY"),
         (&["--accept", "60 control=127"], "--trust-network"),
+        (&["--accept", "60 except=Drive"], "`Drive`"),
         (&["--offer", "all"], "60.255.255"),
         (&["--min-period", "Speed=1s"], "jaus list messages"),
         (&["--prefix", "a/*"], "site/jaus"),

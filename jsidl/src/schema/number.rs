@@ -53,6 +53,10 @@ fn named(number: Json, values: &ValueSet) -> Json {
     let listed: Vec<_> = listed.map(|v| format!("{} {}", v.index, v.name)).collect();
     let mut schema = json!({ "anyOf": [number, { "enum": names }] });
     schema["x-values"] = listed.into();
+    if !values.ranges.is_empty() {
+        let ranges = values.ranges.iter().map(ToString::to_string);
+        schema["x-ranges"] = ranges.collect::<Vec<_>>().into();
+    }
     schema
 }
 

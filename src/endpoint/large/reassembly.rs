@@ -20,12 +20,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
+use jaus_limits::Tally;
 
 use super::style;
 use crate::address::JausId;
 use crate::endpoint::arrival::Arrival;
 use crate::endpoint::rate::Origin;
-use crate::endpoint::share::{Ages, Tally};
+use crate::endpoint::share::Ages;
 use crate::endpoint::{Config, Counter, Counters, Path, Remote, SessionId};
 use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version};

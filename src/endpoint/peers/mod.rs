@@ -15,9 +15,11 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
+use jaus_limits::Tally;
+
 use super::arrival::Arrival;
 use super::rate::Origin;
-use super::share::{Ages, Tally};
+use super::share::Ages;
 use super::{Config, Counter, LinkId, Path, StaticPeer};
 use crate::address::JausId;
 use crate::wire::{Frame, Version};

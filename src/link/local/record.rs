@@ -217,15 +217,11 @@ impl Record {
         Self { head, payload }
     }
 
-    /// The payload as text that is safe for a terminal, at most 255 octets of it.
+    /// The payload as printable text, made of at most 255 octets of it.
     #[must_use]
     pub fn text(&self) -> String {
         let octets = &self.payload[..self.payload.len().min(LONGEST_TEXT)];
-        let shown = |c: char| match c {
-            c if c.is_control() => char::REPLACEMENT_CHARACTER,
-            c => c,
-        };
-        String::from_utf8_lossy(octets).chars().map(shown).collect()
+        jaus_text::visible(&String::from_utf8_lossy(octets)).into_owned()
     }
 
     /// Appends the record without its payload, which must follow unchanged.

@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
+use jaus_limits::Shares;
+
 use super::pace::Budget;
 use crate::address::JausId;
-use crate::service::share::{Share, Shares};
+use crate::service::share::Share;
 
 /// A known component.
 #[derive(Debug)]
@@ -34,8 +36,8 @@ pub(super) struct Peers {
     refreshes: BTreeSet<(Instant, JausId)>,
     /// Components that are only listed, by the component that listed them.
     listed: BTreeSet<(JausId, JausId)>,
-    entries: Shares,
-    octets: Shares,
+    entries: Shares<Share>,
+    octets: Shares<Share>,
     /// Budget of each share for changes of known facts.
     news: BTreeMap<Share, Budget>,
     /// The number of components that send messages themselves and have answered.

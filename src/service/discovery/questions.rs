@@ -5,9 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
 use std::time::{Duration, Instant};
 
+use jaus_limits::Shares;
+
 use crate::address::JausId;
 use crate::service::Level;
-use crate::service::share::{Share, Shares};
+use crate::service::share::Share;
 
 /// A fact to query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,7 +48,7 @@ pub(super) struct Questions {
     /// The share whose query was sent last.
     turn: Share,
     last: u64,
-    shares: Shares,
+    shares: Shares<Share>,
 }
 
 impl Questions {

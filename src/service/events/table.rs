@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use jaus_limits::Shares;
 
 use crate::address::JausId;
 use crate::service::code_of;
-use crate::service::share::{Share, Shares};
+use crate::service::share::Share;
 
 /// The client and its event number.
 pub(super) type Name = (JausId, u8);
@@ -88,9 +89,9 @@ pub(super) struct Table {
     expiring: BTreeSet<(Instant, Name)>,
     /// Events on change, by the code of their query.
     by_query: BTreeSet<(u16, Name)>,
-    shares: Shares,
+    shares: Shares<Share>,
     /// Reports of periodic events, in 1000 seconds.
-    rates: Shares,
+    rates: Shares<Share>,
 }
 
 impl Table {

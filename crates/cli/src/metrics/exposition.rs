@@ -198,17 +198,19 @@ impl Display for Value {
     }
 }
 
-/// A text of a label or a description, with the escapes of both formats.
+/// A text of a label or a description: [visible](jaus_text::visible), with the escapes of both
+/// formats.
 struct Escaped<'t>(&'t str);
 
 impl Display for Escaped<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.chars().try_for_each(|c| match c {
-            '\\' => f.write_str(r"\\"),
-            '"' => f.write_str("\\\""),
-            '\n' => f.write_str(r"\n"),
-            c => f.write_char(c),
-        })
+        jaus_text::visible(self.0)
+            .chars()
+            .try_for_each(|c| match c {
+                '\\' => f.write_str(r"\\"),
+                '"' => f.write_str("\\\""),
+                c => f.write_char(c),
+            })
     }
 }
 
@@ -230,7 +232,7 @@ mod tests {
         let expected = "# HELP x_received_bytes Octets received.\n\
             # TYPE x_received_bytes counter\n\
             # UNIT x_received_bytes bytes\n\
-            x_received_bytes_total{link=\"a \\\"b\\\"\\\\\\n\",way=\"7\"} 12\n\
+            x_received_bytes_total{link=\"a \\\"b\\\"\\\\\\\\n\",way=\"7\"} 12\n\
             # HELP x_speed_meters_per_second Speed.\n\
             # TYPE x_speed_meters_per_second gauge\n\
             # UNIT x_speed_meters_per_second meters_per_second\n\
@@ -240,10 +242,20 @@ mod tests {
     }
 
     #[test]
+    fn a_label_is_printable_whatever_name_it_holds() {
+        let mut exposition = Exposition::new(Format::Prometheus);
+        let mut family = exposition.gauge("x", Unit::None, "X.");
+        family.add(&[("name", &"\x1b[2J\"\n# EOF\u{202e}Müller")], true);
+        let text = exposition.finish();
+        let sample = "x{name=\"\\\\u{1b}[2J\\\"\\\\n# EOF\\\\u{202e}Müller\"} 1";
+        assert_eq!(text.lines().last(), Some(sample), "{text}");
+    }
+
+    #[test]
     fn the_older_format_describes_a_counter_by_the_name_of_its_samples() {
         let expected = "# HELP x_received_bytes_total Octets received.\n\
             # TYPE x_received_bytes_total counter\n\
-            x_received_bytes_total{link=\"a \\\"b\\\"\\\\\\n\",way=\"7\"} 12\n\
+            x_received_bytes_total{link=\"a \\\"b\\\"\\\\\\\\n\",way=\"7\"} 12\n\
             # HELP x_speed_meters_per_second Speed.\n\
             # TYPE x_speed_meters_per_second gauge\n\
             x_speed_meters_per_second -0.5\n";

@@ -8,12 +8,14 @@ use jaus::endpoint::Peer;
 #[cfg(unix)]
 use jaus::node::JuniorReport;
 use jaus::node::{LinkReport, Node, TcpReport};
+use jaus_limits::fair_selection;
 
 use super::counts;
 use super::exposition::{Exposition, Unit, Value};
 
-/// Maximum number of peers, links or components with samples of their own. Peers are those known
-/// longest, so that new ids, which any sender can invent, replace none.
+/// Maximum number of peers, links or components with samples of their own. Peers are chosen evenly from
+/// all network addresses, and of each address those known longest: ids that a sender invents replace
+/// none of other hosts.
 const MOST: usize = 64;
 /// A peer that is silent for this time leaves its place to others.
 const SILENCE: Duration = Duration::from_secs(60);
@@ -256,8 +258,7 @@ fn add_peers(exposition: &mut Exposition, node: &Node, now: Instant) {
         .gauge("jaus_peers", Unit::None, help)
         .add(&[], peers.len());
     peers.retain(|peer| now.saturating_duration_since(peer.last_heard) < SILENCE);
-    peers.sort_by_key(|peer| (peer.first_heard, peer.id));
-    peers.truncate(MOST);
+    let peers = with_samples(peers);
     add_table(
         exposition,
         &peers,
@@ -319,6 +320,12 @@ fn add_peers(exposition: &mut Exposition, node: &Node, now: Instant) {
     });
 }
 
+/// The peers with samples of their own.
+fn with_samples(mut peers: Vec<Peer>) -> Vec<Peer> {
+    peers.sort_by_key(|peer| (peer.first_heard, peer.id));
+    fair_selection(peers, MOST, |peer| peer.path.peer.origin())
+}
+
 fn add_times(
     exposition: &mut Exposition,
     name: &str,
@@ -367,8 +374,9 @@ fn add_components(exposition: &mut Exposition, node: &Node) {
 
 #[cfg(test)]
 mod tests {
+    use jaus::address::JausId;
     use jaus::component::{Component, Kind};
-    use jaus::endpoint::Counter;
+    use jaus::endpoint::{Counter, Remote};
     use jaus::node::{Config, now};
     use jaus_test_kit::group::own_group;
     use jaus_test_kit::waiting::until;
@@ -409,6 +417,30 @@ mod tests {
         };
         assert!(has_samples(Duration::ZERO));
         assert!(!has_samples(2 * SILENCE));
+    }
+
+    #[tokio::test]
+    async fn ids_that_a_host_invents_take_no_place_of_another_host() {
+        let group = own_group();
+        let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+        let (node, other) = (start(101), start(102));
+        let rover = || Component::builder(Kind::Vehicle, "Rover");
+        let _rovers = [&node, &other].map(|it| rover().attach(it, 1).unwrap());
+        until(|| !node.peers().is_empty()).await;
+        let known = node.peers()[0];
+        let peer = |number: u16, host: [u8; 4]| {
+            let mut peer = known;
+            peer.id = JausId::new(number, 1, 1);
+            peer.path.peer = Remote::Socket((host, number).into());
+            peer
+        };
+        let flood = (1..=1000).map(|number| peer(number, [10, 0, 0, 66]));
+        // The youngest, with the greatest id.
+        let mut vehicle = peer(2000, [10, 0, 0, 1]);
+        vehicle.first_heard += Duration::from_secs(10);
+        let shown = with_samples(flood.chain([vehicle]).collect());
+        assert_eq!(shown.len(), MOST);
+        assert!(shown.iter().any(|peer| peer.id == vehicle.id));
     }
 
     #[cfg(unix)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use jaus_secure::CertificateFiles;
+use jaus_secure::{CertificateFiles, Key};
 
 use crate::failure::Failure;
 use crate::folders::config_folder;
@@ -63,7 +63,8 @@ impl Certificates {
 /// The files of keys.
 #[derive(Args, Debug)]
 pub struct KeyFiles {
-    /// The file of this node's key [default: ~/.config/jaus/node.key]
+    /// The file of this node's key, or the PKCS #11 URI of a key in a token [default:
+    /// ~/.config/jaus/node.key]
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
 
@@ -73,7 +74,7 @@ pub struct KeyFiles {
 }
 
 impl KeyFiles {
-    /// The file of this node's key.
+    /// The file of this node's key, or the URI of a key in a token.
     ///
     /// # Errors
     /// Without a flag and a home directory.
@@ -99,10 +100,14 @@ impl KeyFiles {
     /// # Errors
     /// As [`key`](Self::key).
     pub fn trusted_keys(&self) -> Result<PathBuf, Failure> {
-        match &self.trusted_keys {
-            Some(path) => Ok(path.clone()),
-            None => Ok(self.key()?.with_file_name("trusted_keys")),
+        if let Some(path) = &self.trusted_keys {
+            return Ok(path.clone());
         }
+        let key = self.key()?;
+        if Key::is_in_token(&key) {
+            return Ok(Self::folder()?.join("trusted_keys"));
+        }
+        Ok(key.with_file_name("trusted_keys"))
     }
 }
 

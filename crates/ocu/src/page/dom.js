@@ -1,5 +1,12 @@
 // Small tools for the document. Everything that comes from the network reaches it as text through
-// these functions, never as markup: names are chosen by peers.
+// these functions, never as markup: names are chosen by peers. What does not show itself, turns or hides
+// letters, or begins a line in a name reaches it as a blank.
+
+// Controls, formats, separators and invisible characters: what the crate `jaus-text` calls unprintable.
+const HIDDEN = /[\p{Cc}\p{Cf}\p{Zl}\p{Zp}\p{Default_Ignorable_Code_Point}\p{Noncharacter_Code_Point}\u2800]/gu;
+
+/** Text with blanks in place of what is hidden. Line ends stay: lists and messages have some. */
+const visible = (text) => (typeof text === "string" ? text.replace(HIDDEN, (letter) => (letter === "\n" ? letter : " ")) : text);
 
 /** The element with an id, which index.html has. */
 export const get = (id) => document.getElementById(id);
@@ -9,23 +16,24 @@ export function make(tag, { className, ...attributes } = {}, ...children) {
   const element = document.createElement(tag);
   if (className) element.className = className;
   for (const [name, value] of Object.entries(attributes)) {
-    if (value !== undefined && value !== null) element.setAttribute(name, value);
+    if (value !== undefined && value !== null) element.setAttribute(name, visible(value));
   }
-  element.append(...children);
+  element.append(...children.map(visible));
   return element;
 }
 
 /** Sets an element's text, touching the document only if it differs. */
 export function say(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const shown = visible(text);
+  if (element.textContent !== shown) element.textContent = shown;
 }
 
 /** Sets an attribute likewise; null removes it. */
 export function mark(element, name, value) {
   if (value === null || value === undefined || value === false) {
     if (element.hasAttribute(name)) element.removeAttribute(name);
-  } else if (element.getAttribute(name) !== String(value)) {
-    element.setAttribute(name, value);
+  } else if (element.getAttribute(name) !== visible(String(value))) {
+    element.setAttribute(name, visible(String(value)));
   }
 }
 
@@ -39,7 +47,8 @@ export function plain(value, limit = 120) {
   if (value === null || value === undefined) return "";
   const text = String(value)
     .slice(0, limit * 4)
-    .replace(/[\p{Cc}\p{Cf}\u2028\u2029]+/gu, " ")
+    .replace(HIDDEN, " ")
+    .replace(/ +/g, " ")
     .trim();
   return text.length > limit ? `${text.slice(0, limit - 1)}…` : text;
 }

@@ -3,8 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use jaus_limits::{Buckets, Rate};
-use jaus_view::places::Source;
+use jaus_limits::{Buckets, Rate, Source};
 
 use super::devices::DeviceId;
 

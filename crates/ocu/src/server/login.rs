@@ -9,7 +9,7 @@ use axum::body::{Body, to_bytes};
 use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Response};
-use jaus_view::places::Source;
+use jaus_limits::Source;
 use serde::{Deserialize, Serialize};
 use tokio::time::{sleep, timeout};
 

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use jaus::rights::Refusal;
-use jaus_view::places::Place;
+use jaus_limits::Place;
 
 use super::Admission;
 use super::logins::LoginId;

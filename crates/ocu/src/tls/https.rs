@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use jaus_files::Readers;
-use ring::digest;
 use rustls::ServerConfig;
 use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
@@ -16,6 +15,7 @@ use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 
 use super::certificate;
+use super::crypto::{self, digest};
 use super::error::{TlsError, in_file};
 
 /// The longest file of certificates or a key, in octets.
@@ -43,7 +43,7 @@ impl Tls {
         check_time(own, now, certificate)?;
         let fingerprint = fingerprint(own);
         let private = private_key(key)?;
-        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let provider = Arc::new(crypto::default_provider());
         let unusable = |source| TlsError::Unusable {
             path: certificate.to_owned(),
             source,

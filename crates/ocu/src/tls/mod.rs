@@ -3,6 +3,8 @@
 #[cfg(feature = "https")]
 mod certificate;
 #[cfg(feature = "https")]
+mod crypto;
+#[cfg(feature = "https")]
 mod error;
 #[cfg(feature = "https")]
 mod https;

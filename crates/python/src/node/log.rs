@@ -84,7 +84,8 @@ impl Lines {
     fn pass_on(&self, function: &Py<PyAny>) {
         loop {
             let line = self.next();
-            let text = String::from_utf8_lossy(&line.text).trim_end().to_owned();
+            let text = String::from_utf8_lossy(&line.text);
+            let text = jaus_text::visible(text.trim_end());
             let passed = Python::try_attach(|py| {
                 if let Err(error) = function.call1(py, (line.level, text)) {
                     error.write_unraisable(py, None);

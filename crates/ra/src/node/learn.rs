@@ -318,11 +318,11 @@ fn confirmation(message: &Message) -> Option<ConfirmEventRequest> {
     known.body().ok()
 }
 
-/// A name up to its first zero, without control characters.
+/// A name up to its first zero, in printable characters.
 fn readable(name: &Text) -> String {
     let octets = name.as_bytes().split(|&octet| octet == 0).next();
     let text = String::from_utf8_lossy(octets.unwrap_or_default());
-    text.chars().filter(|c| !c.is_control()).collect()
+    jaus_text::visible(&text).into_owned()
 }
 
 fn service(seq: &report_services::ServiceSeq) -> RaServiceEntry {

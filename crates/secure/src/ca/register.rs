@@ -129,5 +129,5 @@ fn seconds(text: &str) -> Result<SystemTime, String> {
     let seconds = text.parse().ok().map(Duration::from_secs);
     seconds
         .and_then(|it| SystemTime::UNIX_EPOCH.checked_add(it))
-        .ok_or_else(|| format!("`{}` is not a number of seconds", text.escape_default()))
+        .ok_or_else(|| format!("`{}` is not a number of seconds", jaus_text::visible(text)))
 }

@@ -22,7 +22,7 @@ fn unix(seconds: u64) -> UnixTime {
 
 fn authority() -> (TempDir, CertificateAuthority) {
     let folder = tempfile::tempdir().unwrap();
-    let authority = CertificateAuthority::create(folder.path(), "team", at(NOW)).unwrap();
+    let authority = CertificateAuthority::create(folder.path(), "team", None, at(NOW)).unwrap();
     (folder, authority)
 }
 
@@ -87,10 +87,7 @@ fn a_revoked_certificate_is_refused_and_another_of_the_name_is_not() {
 
     assert_eq!(authority.revoke("rover", at(NOW)).unwrap().len(), 1);
     assert!(at_node(&folder).verify(&second, unix(NOW)).is_err());
-    let issued = CertificateAuthority::open(folder.path())
-        .unwrap()
-        .issued()
-        .unwrap();
+    let issued = CertificateAuthority::issued(folder.path()).unwrap();
     assert!(
         issued.iter().all(|it| it.revoked == Some(at(NOW))),
         "{issued:?}"
@@ -118,7 +115,7 @@ fn another_authority_is_refused_and_so_is_its_revocation_list() {
 
 fn authority_named(name: &str) -> (TempDir, CertificateAuthority) {
     let folder = tempfile::tempdir().unwrap();
-    let authority = CertificateAuthority::create(folder.path(), name, at(NOW)).unwrap();
+    let authority = CertificateAuthority::create(folder.path(), name, None, at(NOW)).unwrap();
     (folder, authority)
 }
 
@@ -188,13 +185,13 @@ fn a_request_out_of_range_is_refused() {
     ] {
         assert!(authority.issue(&bad, at(NOW)).is_err(), "{bad:?}");
     }
-    assert_eq!(authority.issued().unwrap(), []);
+    assert_eq!(CertificateAuthority::issued(&authority.folder).unwrap(), []);
 }
 
 #[test]
 fn an_authority_is_not_replaced_and_a_damaged_register_is_named() {
     let (folder, authority) = authority();
-    assert!(CertificateAuthority::create(folder.path(), "other", at(NOW)).is_err());
+    assert!(CertificateAuthority::create(folder.path(), "other", None, at(NOW)).is_err());
     issue(&authority, "rover");
     let path = folder.path().join("issued");
     let text = fs::read_to_string(&path).unwrap();

@@ -17,14 +17,14 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
+use jaus::rights::Unaccepted;
 use jaus::wire::Frame;
-use ring::rand::{SecureRandom as _, SystemRandom};
 
 use super::record::Act;
-use super::screen::{self, Stop};
+use super::screen;
 use super::session::Session;
 use super::{Counter, Transport, WARNING_PAUSE, code};
-use crate::key::PublicKey;
+use crate::key::{self, PublicKey};
 
 /// The first octet of a hello. No JAUS transport begins with it.
 pub(super) const HELLO: u8 = 0xFD;
@@ -54,11 +54,7 @@ impl Instance {
 
     /// A new one; without random numbers the program behaves as one before this version.
     pub(super) fn random() -> Self {
-        let mut octets = [0; LENGTH];
-        match SystemRandom::new().fill(&mut octets) {
-            Ok(()) => Self(octets),
-            Err(_) => Self::UNNAMED,
-        }
+        key::random().map_or(Self::UNNAMED, Self)
     }
 
     /// The message that tells it to a peer.
@@ -212,7 +208,7 @@ impl Transport {
         let is_free = |frame: &Frame| !has_others || owner(frame.source).is_none();
         // What is no JUDP is counted by the next check.
         let Some(screened) = screen::screen(octets, |it| {
-            is_free(it).then_some(()).ok_or(Stop::ForeignId)
+            is_free(it).then_some(true).ok_or(Unaccepted::Source)
         }) else {
             return Some(octets.clone());
         };

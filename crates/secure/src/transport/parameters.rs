@@ -7,11 +7,11 @@ use quinn_proto::{
     ClientConfig, EndpointConfig, HashedConnectionIdGenerator, IdleTimeout, ServerConfig,
     TransportConfig, VarInt,
 };
-use ring::hmac;
 
 use super::session::STREAMS;
 use super::tokens::Tokens;
 use crate::credentials::Credentials;
+use crate::crypto::hmac;
 use crate::key::Key;
 use crate::tls::{self, Refusals};
 

@@ -8,6 +8,8 @@ mod beacons;
 mod budget;
 mod floods;
 mod instances;
+#[cfg(all(feature = "aws-lc", feature = "ring"))]
+mod libraries;
 
 use std::collections::BTreeMap;
 

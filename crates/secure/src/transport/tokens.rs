@@ -9,9 +9,9 @@ use std::time::{Duration, SystemTime};
 use quinn_proto::{
     BloomTokenLog, ClientConfig, ServerConfig, TimeSource, TokenMemoryCache, ValidationTokenConfig,
 };
-use ring::hkdf;
 
 use crate::credentials::Credentials;
+use crate::crypto::hkdf;
 
 /// How long a token from a session is valid.
 const LIFETIME: Duration = Duration::from_secs(14 * 24 * 60 * 60);

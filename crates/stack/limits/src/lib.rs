@@ -1,18 +1,31 @@
-//! Limits on what others may cost: token buckets of sources, in bounded tables.
+//! Limits on what others may cost: token buckets of sources, and shares of bounded tables.
 //!
 //! | item | what it is |
 //! |---|---|
 //! | [`Rate`] | tokens per second, and how many a source may save |
 //! | [`Bucket`] | the tokens of one source |
 //! | [`Buckets`] | a bucket for each of a bounded number of sources |
+//! | [`Shares`], [`Tally`] | how much of a bounded table each owner holds, and how much it may |
+//! | [`Displacing`] | which idle entry of a bounded table gives way to a new one |
+//! | [`first_of_largest`] | which entry of a short list gives way: of the owner that holds the most |
+//! | [`fair_selection`] | some of many items, evenly from all owners |
+//! | [`Places`] | connections of a server, of which one address gets only a share |
 //! | [`quota_address`] | the part of a network address that shares one bucket |
 //!
 //! Time is an argument.
+
+mod displacing;
+mod places;
+mod shares;
 
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::net::{IpAddr, Ipv6Addr};
 use std::time::{Duration, Instant};
+
+pub use displacing::{Displacing, Room};
+pub use places::{NoPlace, Place, Places, Source};
+pub use shares::{Shares, Tally, fair_selection, first_of_largest};
 
 /// A token bucket rate: a sustained rate and a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

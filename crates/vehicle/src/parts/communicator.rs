@@ -17,7 +17,7 @@ use jaus::node::{ComponentEvents, Events, Node};
 use jaus_view::debug::{DebugAddress, DebugListener, DebugView};
 use jaus_view::{Dictionary, Journal, JournalSettings, tree};
 
-/// Limit on individually logged ID conflicts, since an attacker may invent any number.
+/// Limit of hosts whose ID conflicts are logged, one for each, since an attacker may invent any number.
 const MOST_CONFLICTS: usize = 256;
 
 /// Settings of the vehicle's node beyond routing.
@@ -140,14 +140,15 @@ fn tell_place(node: &Node, log: Option<&JournalSettings>) {
 async fn tell(component: &Component, news: (Events, ComponentEvents)) -> PartError {
     let (mut events, mut arrivals) = news;
     let mut changes: Watch = component.watch();
-    // Every message of the other component repeats the conflict event. Log it once.
+    // Every message of the other component repeats the conflict event. Log it once for each host, which
+    // has any number of ports.
     let mut conflicts: BTreeSet<Remote> = BTreeSet::new();
     loop {
         let words = tokio::select! {
             Some(change) = changes.next() => tree::in_words(change, &component.directory()),
             Some(event) = events.recv() => match event {
                 Event::IdConflict { id, path } => {
-                    let is_new = conflicts.len() < MOST_CONFLICTS && conflicts.insert(path.peer);
+                    let is_new = conflicts.len() < MOST_CONFLICTS && conflicts.insert(path.peer.origin());
                     is_new.then(|| format!(
                         "the node at {} also has our id {id}: choose another for one of them",
                         path.peer

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::net::IpAddr;
 
-/// Limit of incomplete packets. Beyond it the oldest is dropped.
+use jaus_limits::{first_of_largest, quota_address};
+
+/// Limit of incomplete packets. Beyond it the oldest of the sender with the most is dropped.
 const MOST_WAITING: usize = 64;
 /// Maximum length of an IP packet.
 const LONGEST: usize = 65_535;
@@ -82,7 +84,9 @@ impl Fragments {
                 self.given_up += 1;
             }
             None if self.waiting.len() == MOST_WAITING => {
-                self.waiting.pop_front();
+                let place =
+                    first_of_largest(&self.waiting, |it| quota_address(it.key.addresses[0]));
+                place.and_then(|place| self.waiting.remove(place));
                 self.given_up += 1;
             }
             None => {}
@@ -181,6 +185,22 @@ mod tests {
         }
         assert_eq!(fragments.waiting.len(), MOST_WAITING);
         assert_eq!(fragments.incomplete(), 1000);
+    }
+
+    #[test]
+    fn a_flood_of_one_sender_does_not_drop_the_packet_of_another() {
+        let mut fragments = Fragments::default();
+        let of_other = |offset, more, octets| {
+            let mut fragment = fragment(1, offset, more, octets);
+            fragment.key.addresses[0] = IpAddr::from([10, 0, 0, 3]);
+            fragment
+        };
+        assert_eq!(fragments.insert(of_other(0, true, b"01234567")), None);
+        for identification in 0..1000 {
+            fragments.insert(fragment(identification, 0, true, &[0; 8]));
+        }
+        let whole = fragments.insert(of_other(8, false, b"end"));
+        assert_eq!(whole.unwrap(), b"01234567end");
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! Reassembly of TCP streams with bounded memory, and the JTCP messages in them.
 
 use std::collections::VecDeque;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 
 use jaus::wire::Frame;
 use jaus::wire::jtcp::Decoder;
 use jaus::wire::judp::VERSION_AS5669A;
+use jaus_limits::{first_of_largest, quota_address};
 
-/// Limit of streams. Beyond it the one that has been idle for longest is forgotten.
+/// Limit of streams. Beyond it one is forgotten: of the sender with the most, the one that has been
+/// idle for longest.
 const MOST_STREAMS: usize = 256;
 /// Limit of segments that wait for an earlier one. Beyond it that one counts as lost.
 const MOST_WAITING: usize = 64;
@@ -89,7 +91,10 @@ impl Streams {
         let known = place.and_then(|place| self.known.remove(place));
         let forgotten = match known {
             Some(stream) if !segment.syn => return stream,
-            None if self.known.len() == MOST_STREAMS => self.known.pop_front(),
+            None if self.known.len() == MOST_STREAMS => {
+                let place = first_of_largest(&self.known, Stream::sender);
+                place.and_then(|place| self.known.remove(place))
+            }
             known => known,
         };
         self.foreign += forgotten.as_ref().map_or(0, Stream::foreign);
@@ -105,6 +110,11 @@ impl Streams {
 }
 
 impl Stream {
+    /// The network address that sends it.
+    fn sender(&self) -> IpAddr {
+        quota_address(self.ends[0].ip())
+    }
+
     /// Number of its segments, unless it has held a message.
     fn foreign(&self) -> u64 {
         if self.is_jaus { 0 } else { self.segments }
@@ -266,5 +276,25 @@ mod tests {
             (1000, MOST_STREAMS)
         );
         assert_eq!(streams.gaps(), 0);
+    }
+
+    #[test]
+    fn a_flood_of_one_sender_does_not_end_the_stream_of_another() {
+        let mut streams = Streams::default();
+        let octets = ten();
+        let (first, second) = octets.split_at(octets.len() / 2);
+        let of_other = |number, syn, octets| Segment {
+            source: "10.0.0.3:4000".parse().unwrap(),
+            ..segment(number, syn, octets)
+        };
+        streams.insert(of_other(0, true, b""));
+        let mut all = streams.insert(of_other(1, false, first));
+        for port in 0..1000 {
+            let mut flood = segment(0, true, b"GET / HTTP/1.1\r\n");
+            flood.source.set_port(port);
+            streams.insert(flood);
+        }
+        all.extend(streams.insert(of_other(1 + first.len() as u32, false, second)));
+        assert_eq!(all.len(), 10);
     }
 }

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use bytes::Bytes;
+use jaus::address::JausId;
+use jaus_text::quoted;
 use serde_json::{Map, Value as Json};
 
 use crate::dictionary::Dictionary;
 use crate::line::{CARRIED, Line};
-use crate::words::quoted;
-use jaus::address::JausId;
 
 /// A message or an error as one JSON object.
 #[derive(Debug, Clone, PartialEq)]

@@ -17,7 +17,7 @@ use bytes::Bytes;
 use serde_json::Value as Json;
 
 use super::dictionary::Dictionary;
-use super::log::MessageLog;
+use super::log::{Arrival, MessageLog};
 use super::network::Datagram;
 use super::time::Timestamp;
 use jaus::wire::{Frame, judp};
@@ -71,13 +71,17 @@ impl<'d> MessageStream<'d> {
         datagram: &Datagram<'_>,
     ) -> Vec<Entry> {
         let octets = Bytes::copy_from_slice(&datagram.payload);
+        let arrival = Arrival {
+            time,
+            from: Some(datagram.source.ip()),
+        };
         let Ok(frames) = judp::frames(octets) else {
             return Vec::new();
         };
         let frames = frames.map_while(Result::ok);
         let frames = frames.take_while(Frame::is_plausible);
         frames
-            .filter_map(|frame| self.read_frame(time, &frame))
+            .filter_map(|frame| self.read_frame(arrival, &frame))
             .collect()
     }
 
@@ -98,24 +102,25 @@ impl<'d> MessageStream<'d> {
     }
 
     /// The message that a frame contains or completes, if it is to be shown.
-    fn read_frame(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Entry> {
-        if time.is_some_and(|time| self.seen.is_copy(time, frame)) {
+    fn read_frame(&mut self, arrival: Arrival, frame: &Frame) -> Option<Entry> {
+        let is_copy = |time| self.seen.is_copy(time, frame);
+        if arrival.time.is_some_and(is_copy) {
             return None;
         }
-        self.read_whole(time, frame, Vec::new())
+        self.read_whole(arrival, frame, Vec::new())
     }
 
     /// The same for a frame without duplicate check.
     fn read_whole(
         &mut self,
-        time: Option<Timestamp>,
+        arrival: Arrival,
         frame: &Frame,
         way: Vec<(&'static str, String)>,
     ) -> Option<Entry> {
         if frame.is_acknowledgement() || !self.filter.may_pass(frame.source, frame.destination) {
             return None;
         }
-        let line = self.messages.whole_message(time, frame)?;
+        let line = self.messages.whole_message(arrival, frame)?;
         let entry = Entry::of_line(&line, way);
         self.filter.passes(&entry).then_some(entry)
     }

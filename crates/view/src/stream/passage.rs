@@ -1,13 +1,15 @@
 //! Conversion of a running node's traffic to entries.
 
 use std::collections::BTreeMap;
+use std::net::IpAddr;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::seen::Seen;
 use super::{Entry, MessageStream};
+use crate::log::Arrival;
 use crate::time::Timestamp;
 use jaus::address::JausId;
-use jaus::endpoint::{LinkId, To};
+use jaus::endpoint::{LinkId, Remote, To};
 use jaus::node::{Node, Passage, Way};
 use jaus::wire::{Broadcast, Frame};
 
@@ -78,7 +80,11 @@ impl MessageStream<'_> {
                     return None;
                 }
                 let way = way_in_words(passage.way, frame, links);
-                self.read_whole(Some(time), frame, way)
+                let arrival = Arrival {
+                    time: Some(time),
+                    from: sender(passage.way),
+                };
+                self.read_whole(arrival, frame, way)
             })
             .collect()
     }
@@ -102,6 +108,17 @@ impl Seen {
         }
         let known = self.is_copy_for_many(time, frame);
         matches!(way, Way::Local(_)) && known
+    }
+}
+
+/// The network address that a passage comes from.
+fn sender(way: Way) -> Option<IpAddr> {
+    match way {
+        Way::In(path) => match path.peer {
+            Remote::Socket(address) => Some(address.ip()),
+            _ => None,
+        },
+        _ => None,
     }
 }
 

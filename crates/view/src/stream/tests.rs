@@ -129,9 +129,13 @@ fn frame(sequence: u16, payload: &'static [u8]) -> Frame {
 
 const QUERY: &[u8] = b"\x00\x2B\x02";
 
-fn at(milliseconds: u32) -> Option<Timestamp> {
+fn arrival(milliseconds: u32) -> Arrival {
     let (seconds, rest) = (milliseconds / 1000, milliseconds % 1000);
-    Some(Timestamp::new(i64::from(seconds), rest * 1_000_000, 6))
+    let time = Timestamp::new(i64::from(seconds), rest * 1_000_000, 6);
+    Arrival {
+        time: Some(time),
+        from: None,
+    }
 }
 
 /// The number of lines for each frame and its time.
@@ -139,7 +143,7 @@ fn shown(frames: &[(u32, Frame)]) -> Vec<usize> {
     let dictionary = Dictionary::new();
     let mut stream = MessageStream::new(&dictionary, Filter::default());
     let mut read = |(time, frame): &(u32, Frame)| {
-        let entry = stream.read_frame(at(*time), frame);
+        let entry = stream.read_frame(arrival(*time), frame);
         usize::from(entry.is_some())
     };
     frames.iter().map(&mut read).collect()
@@ -208,10 +212,10 @@ fn a_line_for_people_names_who_what_and_the_fields_and_hides_control_characters(
         "source": name, "direction": name, "message": name, "body": {name: name},
     }));
     let shown = hostile.in_words(&dictionary, false);
-    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    assert!(!shown.contains(jaus_text::is_unprintable), "{shown}");
     let error = entry(json!({"message": "M", "error": name}));
     let shown = error.in_words(&dictionary, false);
-    assert!(!shown.contains(crate::disturbs_terminal), "{shown}");
+    assert!(!shown.contains(jaus_text::is_unprintable), "{shown}");
     assert!(velocity().in_words(&dictionary, true).contains("\u{1b}["));
 }
 
@@ -255,7 +259,7 @@ fn an_event_is_shown_with_the_report_inside_and_matches_as_that_report() {
         "message=ReportVelocityState eventid=3",
     ] {
         let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
-        let shown = stream.read_frame(at(0), &event());
+        let shown = stream.read_frame(arrival(0), &event());
         let words = shown.expect(filter).in_words(&complete, false);
         assert!(words.contains("Event: ReportVelocityState "), "{words}");
         assert!(words.contains("EventID=3 SequenceNumber=7"), "{words}");
@@ -263,7 +267,7 @@ fn an_event_is_shown_with_the_report_inside_and_matches_as_that_report() {
     }
     for filter in ["velocity_x>2", "message=4403", "service=PoseSensor"] {
         let mut stream = MessageStream::new(&dictionary, filter.parse().unwrap());
-        assert_eq!(stream.read_frame(at(0), &event()), None, "{filter}");
+        assert_eq!(stream.read_frame(arrival(0), &event()), None, "{filter}");
     }
 }
 
@@ -296,13 +300,13 @@ fn what_the_writer_of_a_line_could_not_decode_is_decoded_and_filtered_here() {
         (frame(1, b"\x02\x40\x02\0\0\0\0"), "ReportStatus"),
         (event(), "ReportVelocityState"),
     ] {
-        let line = writer.read_frame(at(0), &frame).unwrap().to_json();
+        let line = writer.read_frame(arrival(0), &frame).unwrap().to_json();
         assert!(!line.contains(name), "{line}");
         let filter = format!("message={name}").parse().unwrap();
         let stream = MessageStream::new(&dictionary, filter);
         let read = stream.read_json(&line).unwrap().unwrap();
         let mut direct = MessageStream::new(&dictionary, Filter::default());
-        let direct = direct.read_frame(at(0), &frame).unwrap();
+        let direct = direct.read_frame(arrival(0), &frame).unwrap();
         assert_eq!(read.json(), direct.json(), "{line}");
         assert_eq!((read.octets, direct.octets), (None, Some(frame.payload)));
     }

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::net::IpAddr;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
+use jaus_limits::{Buckets, Rate, quota_address};
 use jaus_view::{Entry, Filter};
 
 /// The same trigger counts again after this time without it.
@@ -14,6 +16,10 @@ const QUIET: Duration = Duration::from_secs(60);
 const PAUSE: Duration = Duration::from_secs(60);
 /// A loss of control within this time of the client's own release is no loss.
 const RELEASE: Duration = Duration::from_secs(5);
+/// Tokens that a trigger costs its network address: one a second.
+const COST: u32 = 60;
+/// Tokens of a network address.
+const BY_ADDRESS: Rate = Rate::new(1, 16 * COST);
 /// Limit of each table. The least recent entry makes room.
 const MOST: usize = 1024;
 
@@ -101,13 +107,18 @@ impl Trigger {
 /// A state that is reported again and again triggers once; it triggers again after another state, or
 /// after a minute without it. No trigger counts twice within a minute: a state that begins again
 /// earlier counts when the minute is over, if it lasts.
-#[derive(Debug, Default)]
+///
+/// Of one network address, 16 triggers count at once and one a minute after them: a host that invents
+/// sources does not replace the files of other incidents.
+#[derive(Debug)]
 pub struct Triggers {
     kinds: Vec<TriggerKind>,
     filters: Vec<Filter>,
     occurrences: BTreeMap<Trigger, Occurrence>,
     /// When a client released a component.
     released: BTreeMap<(String, String), Instant>,
+    /// The triggers of each network address.
+    by_address: Buckets<Option<IpAddr>>,
 }
 
 /// How a trigger was recognised so far.
@@ -150,12 +161,20 @@ impl Triggers {
         Self {
             kinds: kinds.to_vec(),
             filters,
-            ..Self::default()
+            occurrences: BTreeMap::new(),
+            released: BTreeMap::new(),
+            by_address: Buckets::displacing(BY_ADDRESS, MOST),
         }
     }
 
-    /// The trigger in a message that passed at `now`, if it counts.
-    pub fn handle_entry(&mut self, entry: &Entry, now: Instant) -> Option<Trigger> {
+    /// The trigger in a message from a network address that passed at `now`, if it counts. `None` is an
+    /// origin without an address.
+    pub fn handle_entry(
+        &mut self,
+        entry: &Entry,
+        from: Option<IpAddr>,
+        now: Instant,
+    ) -> Option<Trigger> {
         let kind = self.recognise(entry, now)?;
         let source = entry.text("source").unwrap_or_default().to_owned();
         let trigger = Trigger { kind, source };
@@ -169,6 +188,8 @@ impl Triggers {
                 true
             }
         };
+        let from = from.map(quota_address);
+        let counts = counts && self.by_address.take_many(now, from, COST).is_ok();
         counts.then_some(trigger)
     }
 
@@ -272,7 +293,7 @@ mod tests {
         let start = Instant::now();
         let mut kind_of = |minute, entry: &Entry| {
             let now = start + minute * Duration::from_secs(60);
-            triggers.handle_entry(entry, now).map(|it| it.kind)
+            triggers.handle_entry(entry, None, now).map(|it| it.kind)
         };
         assert_eq!(kind_of(0, &status("1.1.1", "READY")), None);
         let emergency = status("1.1.1", "EMERGENCY");
@@ -295,7 +316,7 @@ mod tests {
         for tenth in 0..1500 {
             let now = start + tenth * Duration::from_millis(100);
             let state = if tenth % 2 == 0 { "EMERGENCY" } else { "READY" };
-            let trigger = triggers.handle_entry(&status("66.1.1", state), now);
+            let trigger = triggers.handle_entry(&status("66.1.1", state), None, now);
             counted.extend(trigger.map(|_| tenth / 10));
         }
         assert_eq!(counted, [0, 60, 120]);
@@ -308,7 +329,7 @@ mod tests {
         let mut counts = |second, state| {
             let now = start + Duration::from_secs(second);
             triggers
-                .handle_entry(&status("1.1.1", state), now)
+                .handle_entry(&status("1.1.1", state), None, now)
                 .is_some()
         };
         assert!(counts(0, "FAILURE"));
@@ -325,7 +346,7 @@ mod tests {
             "source": "1.1.1", "code": "41F1", "body": {},
             "carries": { "code": "4002", "body": { "Status": "FAILURE" } },
         }));
-        let trigger = all().handle_entry(&event, Instant::now()).unwrap();
+        let trigger = all().handle_entry(&event, None, Instant::now()).unwrap();
         assert_eq!(
             (trigger.kind, &*trigger.source),
             (TriggerKind::Fault, "1.1.1")
@@ -339,7 +360,7 @@ mod tests {
         let start = Instant::now();
         let mut counts = |seconds| {
             let now = start + Duration::from_secs(seconds);
-            triggers.handle_entry(&command, now).is_some()
+            triggers.handle_entry(&command, None, now).is_some()
         };
         assert!(counts(0));
         assert!(!counts(50));
@@ -356,10 +377,10 @@ mod tests {
         let reject = control("0010", component, client);
         let now = Instant::now();
         let mut triggers = all();
-        triggers.handle_entry(&control("000E", client, component), now);
-        assert_eq!(triggers.handle_entry(&reject, now), None);
+        triggers.handle_entry(&control("000E", client, component), None, now);
+        assert_eq!(triggers.handle_entry(&reject, None, now), None);
         let later = now + Duration::from_secs(6);
-        let lost = triggers.handle_entry(&reject, later).unwrap();
+        let lost = triggers.handle_entry(&reject, None, later).unwrap();
         assert_eq!(lost.kind, TriggerKind::ControlLost);
     }
 
@@ -368,12 +389,29 @@ mod tests {
         let mut none = Triggers::new(&[], vec!["message=ReportStatus".parse().unwrap()]);
         let mut report = status("1.1.1", "EMERGENCY").json().clone();
         assert_eq!(
-            none.handle_entry(&Entry::of_object(report.clone()), Instant::now()),
+            none.handle_entry(&Entry::of_object(report.clone()), None, Instant::now()),
             None
         );
         report.insert("message".to_owned(), "ReportStatus".into());
-        let trigger = none.handle_entry(&Entry::of_object(report), Instant::now());
+        let trigger = none.handle_entry(&Entry::of_object(report), None, Instant::now());
         assert_eq!(trigger.unwrap().kind, TriggerKind::Message);
+    }
+
+    #[test]
+    fn a_host_that_invents_sources_leaves_triggers_to_others() {
+        let mut triggers = all();
+        let now = Instant::now();
+        let [flood, other] = [66, 1].map(|host| Some(IpAddr::from([10, 0, 0, host])));
+        let mut counted = |from, subsystem: u32, later: u64| {
+            let status = status(&format!("{subsystem}.1.1"), "FAILURE");
+            let now = now + Duration::from_secs(later);
+            triggers.handle_entry(&status, from, now).is_some()
+        };
+        let first = (0..1000).filter(|it| counted(flood, 1000 + it, 0)).count();
+        assert_eq!(first, 16);
+        assert!(counted(other, 101, 0));
+        let second = (0..1000).filter(|it| counted(flood, 2000 + it, 61)).count();
+        assert_eq!(second, 1);
     }
 
     #[test]
@@ -381,7 +419,7 @@ mod tests {
         let mut triggers = all();
         let now = Instant::now();
         for number in 0..3 * MOST {
-            triggers.handle_entry(&status(&format!("{number}.1.1"), "FAILURE"), now);
+            triggers.handle_entry(&status(&format!("{number}.1.1"), "FAILURE"), None, now);
         }
         assert_eq!(triggers.occurrences.len(), MOST);
     }

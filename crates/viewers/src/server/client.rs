@@ -1,6 +1,6 @@
 //! One connected viewer: its subscriptions, and the queue of its samples.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use bytes::Bytes;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
 use tokio::net::TcpStream;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::{Error, Message};
@@ -159,7 +159,7 @@ pub(super) async fn serve(shared: &Shared, socket: Socket) {
         shared,
         client: &client,
         sink,
-        announced: 0,
+        announced: BTreeSet::new(),
         warned: None,
     };
     tokio::select! {
@@ -210,8 +210,8 @@ struct Writer<'s> {
     shared: &'s Shared,
     client: &'s Client,
     sink: SplitSink<Socket, Message>,
-    /// Number of channels that were announced.
-    announced: usize,
+    /// The channels that were announced.
+    announced: BTreeSet<usize>,
     /// When it was warned last of lost samples.
     warned: Option<Instant>,
 }
@@ -225,17 +225,18 @@ impl Writer<'_> {
         let settings = &self.shared.settings;
         let info = protocol::server_info(&settings.name, &settings.session);
         self.send(Message::text(info)).await?;
-        let mut count = self.shared.count.subscribe();
+        let mut opened = self.shared.opened.subscribe();
+        self.announce().await?;
         let mut turns = interval(PING);
         turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
         turns.reset();
         loop {
-            self.announce(&mut count).await?;
             tokio::select! {
-                changed = count.changed() => {
+                changed = opened.changed() => {
                     if changed.is_err() {
                         return Ok(());
                     }
+                    self.announce().await?;
                 }
                 Some(data) = waiting.recv() => {
                     let length = data.len();
@@ -250,15 +251,21 @@ impl Writer<'_> {
         }
     }
 
-    /// Announces the channels that are new.
-    async fn announce(&mut self, count: &mut watch::Receiver<usize>) -> Result<(), Error> {
-        while self.announced < *count.borrow_and_update() {
-            let new = self.shared.channels_from(self.announced);
-            for some in new.chunks(TOGETHER) {
-                let text = protocol::advertise(some.iter().map(AsRef::as_ref));
-                self.send(Message::text(text)).await?;
-                self.announced += some.len();
+    /// Announces the channels that are new, and those that are closed.
+    async fn announce(&mut self) -> Result<(), Error> {
+        let (new, closed) = self.shared.changes(&self.announced);
+        if !closed.is_empty() {
+            for channel in &closed {
+                self.announced.remove(channel);
+                self.client.subscriptions().remove(channel);
             }
+            let text = protocol::unadvertise(&closed);
+            self.send(Message::text(text)).await?;
+        }
+        for some in new.chunks(TOGETHER) {
+            let text = protocol::advertise(some.iter().map(AsRef::as_ref));
+            self.send(Message::text(text)).await?;
+            self.announced.extend(some.iter().map(|it| it.index));
         }
         Ok(())
     }

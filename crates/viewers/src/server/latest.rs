@@ -51,6 +51,18 @@ impl Latest {
         self.samples.get(&channel)
     }
 
+    /// Drops the samples of channels that are closed.
+    pub(super) fn forget(&mut self, is_closed: impl Fn(usize) -> bool) {
+        let large = &mut self.large_octets;
+        self.samples.retain(|&channel, sample| {
+            let is_closed = is_closed(channel);
+            if is_closed {
+                *large -= shared_octets(sample.data.len());
+            }
+            !is_closed
+        });
+    }
+
     fn has_room(&self, octets: usize) -> bool {
         self.samples.len() < MOST_CHANNELS
             && octets <= LARGEST

@@ -9,6 +9,7 @@ mod client;
 mod handshake;
 mod latest;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 use std::io;
 use std::net::SocketAddr;
@@ -16,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
-use jaus_view::places::{Place, Places, Source};
+use jaus_limits::{Place, Places, Source};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
@@ -86,9 +87,10 @@ pub struct Sharing(Arc<Shared>);
 #[derive(Debug)]
 struct Shared {
     settings: ServerSettings,
-    channels: RwLock<Vec<Arc<Channel>>>,
-    /// The number of channels, for the clients to announce new ones.
-    count: watch::Sender<usize>,
+    channels: RwLock<BTreeMap<usize, Arc<Channel>>>,
+    /// How many channels were opened, for the clients to announce changes. None is closed but for a new
+    /// one.
+    opened: watch::Sender<usize>,
     /// Locked while samples or a subscription are handled, before the locks of the clients: so a
     /// subscription gets each sample once, either as the latest or when it is published.
     latest: Mutex<Latest>,
@@ -103,8 +105,8 @@ impl Server {
     pub fn new(settings: ServerSettings) -> (Self, Sharing) {
         let shared = Arc::new(Shared {
             settings,
-            channels: RwLock::new(Vec::new()),
-            count: watch::Sender::new(0),
+            channels: RwLock::default(),
+            opened: watch::Sender::new(0),
             latest: Mutex::default(),
             clients: Mutex::new(Vec::new()),
             lost: AtomicU64::new(0),
@@ -165,14 +167,16 @@ async fn pause_after(error: &io::Error) {
 
 impl Sharing {
     /// Publishes samples of `channels` to the clients that have subscribed to them, and announces new
-    /// channels. Never waits for a client: one whose queue is full loses samples.
+    /// channels, and those that are closed. Never waits for a client: one whose queue is full loses samples.
     ///
     /// The latest sample of each channel is kept for clients that subscribe later, if it has at most
     /// 1 KiB, or at most 1 MiB and those of more than 1 KiB have at most 8 MiB together.
     pub fn publish(&self, channels: &Channels<'_>, samples: &[Sample]) {
-        self.announce(channels.all());
         let shared = &self.0;
         let mut latest = shared.latest();
+        if self.announce(channels) {
+            latest.forget(|channel| channels.get(channel).is_none());
+        }
         let clients = shared.clients();
         for sample in samples {
             // Serialising to memory fails only for non-text map keys, which do not occur.
@@ -198,15 +202,22 @@ impl Sharing {
         self.0.lost.load(Ordering::Relaxed)
     }
 
-    fn announce(&self, all: &[Arc<Channel>]) {
-        if *self.0.count.borrow() == all.len() {
-            return;
+    /// Announces new channels, and those that are closed; returns whether any is.
+    fn announce(&self, new: &Channels<'_>) -> bool {
+        let known = *self.0.opened.borrow();
+        if known == new.opened() {
+            return false;
         }
         let channels = self.0.channels.write();
         let mut channels = channels.unwrap_or_else(PoisonError::into_inner);
-        let known = channels.len();
-        channels.extend(all.iter().skip(known).cloned());
-        self.0.count.send_replace(channels.len());
+        let opened = new.all().range(known..);
+        channels.extend(opened.map(|(&index, channel)| (index, channel.clone())));
+        let is_any_closed = channels.len() > new.all().len();
+        if is_any_closed {
+            channels.retain(|&index, _| new.get(index).is_some());
+        }
+        self.0.opened.send_replace(new.opened());
+        is_any_closed
     }
 }
 
@@ -226,10 +237,14 @@ impl Shared {
         }
     }
 
-    /// The channels from this number on.
-    fn channels_from(&self, first: usize) -> Vec<Arc<Channel>> {
+    /// The channels that are not in `announced`, and the numbers in it that are closed.
+    fn changes(&self, announced: &BTreeSet<usize>) -> (Vec<Arc<Channel>>, Vec<usize>) {
         let channels = self.channels.read();
         let channels = channels.unwrap_or_else(PoisonError::into_inner);
-        channels.iter().skip(first).cloned().collect()
+        let new = channels
+            .values()
+            .filter(|it| !announced.contains(&it.index));
+        let closed = announced.iter().filter(|it| !channels.contains_key(it));
+        (new.cloned().collect(), closed.copied().collect())
     }
 }

@@ -1,6 +1,7 @@
 //! The protocol as a well-behaved viewer sees it.
 
 use jaus_test_kit::waiting::until;
+use jaus_viewers::MOST_CHANNELS;
 use serde_json::json;
 
 use crate::scene::{Scene, TIME, Viewer};
@@ -85,4 +86,48 @@ async fn a_viewer_that_has_gone_is_forgotten() {
     until(|| scene.sharing.clients() == 1).await;
     drop(viewer);
     until(|| scene.sharing.clients() == 0).await;
+}
+
+#[tokio::test]
+async fn idle_channels_of_a_flood_are_closed_for_those_of_a_new_vehicle() {
+    let scene = Scene::new().await;
+    let mut channels = scene.channels();
+    for address in 0..200 {
+        let from = Some(format!("10.1.{address}.1").parse().unwrap());
+        for component in 1..=250 {
+            let source = format!("{}.1.{component}", 1000 + address);
+            scene.publish_from(&mut channels, (&source, from), TIME, 0);
+        }
+    }
+    assert_eq!(channels.all().len(), MOST_CHANNELS);
+    let mut viewer = Viewer::connect(&scene).await;
+    let mut known = std::collections::BTreeSet::new();
+    while known.len() < MOST_CHANNELS {
+        let message = viewer.text().await;
+        let some = message["channels"].as_array().into_iter().flatten();
+        known.extend(some.map(|it| it["id"].as_u64().unwrap()));
+    }
+    let vehicle = ("101.1.1", Some("10.0.0.1".parse().unwrap()));
+    let later = TIME + 11_000_000_000;
+    assert!(scene.publish_from(&mut channels, vehicle, later, 5));
+    let closed = viewer.text().await;
+    assert_eq!(closed["op"], "unadvertise");
+    let ids = closed["channelIds"].as_array().unwrap();
+    assert!(
+        ids.len() == 1 && known.contains(&ids[0].as_u64().unwrap()),
+        "{closed}"
+    );
+    let opened = viewer.text().await;
+    let channel = &opened["channels"][0];
+    assert_eq!(channel["topic"], "/jaus/101/1/1/ReportStatus");
+    assert!(
+        !known.contains(&channel["id"].as_u64().unwrap()),
+        "a number of its own"
+    );
+    let subscription = json!({ "id": 9, "channelId": channel["id"] });
+    viewer
+        .say(&json!({ "op": "subscribe", "subscriptions": [subscription] }))
+        .await;
+    let status = json!({ "Status": 1, "Reserved": 5 });
+    assert_eq!(viewer.sample().await, (9, later, status));
 }

@@ -13,4 +13,5 @@ mod damage;
 mod hostile;
 mod live;
 mod recordings;
+mod samples;
 mod scene;

@@ -1,6 +1,6 @@
 //! A recording, a server with a channel, and clients.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 
 use futures_util::{SinkExt, StreamExt};
 use jaus_test_kit::waiting::within_limit;
@@ -75,22 +75,34 @@ impl Scene {
     }
 
     pub fn channels(&self) -> Channels<'_> {
-        Channels::new(&self.dictionary)
+        Channels::live(&self.dictionary)
     }
 
     /// Publishes a status of a component, whose time is [`TIME`] plus `reserved`.
     pub fn publish(&self, channels: &mut Channels<'_>, source: &str, reserved: u32) {
+        let time = TIME + u64::from(reserved);
+        assert!(self.publish_from(channels, (source, None), time, reserved));
+    }
+
+    /// The same for a component at a network address, at a time; returns whether it has a channel.
+    pub fn publish_from(
+        &self,
+        channels: &mut Channels<'_>,
+        (source, from): (&str, Option<IpAddr>),
+        time: u64,
+        reserved: u32,
+    ) -> bool {
         let status = json!({
             "source": source, "code": "4002", "message": "ReportStatus",
             "service": "urn:jaus:jss:core:Management",
             "body": { "Status": "READY", "Reserved": reserved },
         });
         let Json::Object(object) = status else {
-            return;
+            return false;
         };
-        let samples = channels.handle_entry(&Entry::of_object(object), TIME + u64::from(reserved));
-        assert_eq!(samples.len(), 1);
+        let samples = channels.handle_entry(&Entry::of_object(object), from, time);
         self.sharing.publish(channels, &samples);
+        samples.len() == 1
     }
 }
 

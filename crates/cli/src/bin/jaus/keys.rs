@@ -31,6 +31,7 @@ use crate::uptake::with_uptake;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus keys new\n  \
+    jaus keys new --key 'pkcs11:token=rover;object=node?module-path=/usr/lib/softhsm/libsofthsm2.so&pin-source=/etc/jaus/pin'\n  \
     jaus keys trust rover WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s= 101.255.255\n  \
     jaus keys trust console 0b2yKQZ0C3r1mHqkqfM3d5bq0f5fY1b5o8hGxqj9n3E= 60.1.255 control=127\n  \
     jaus keys allow console control=200 clear-emergency\n  \
@@ -205,7 +206,9 @@ impl Keys {
 impl Files {
     fn make(&self) -> Result<Outcome, Failure> {
         let path = self.files.key()?;
-        make_folder_of(&path)?;
+        if !Key::is_in_token(&path) {
+            make_folder_of(&path)?;
+        }
         let key = Key::create(&path).map_err(Failure::of)?;
         say(format_args!(
             "the key is in {}; on each peer run: jaus keys trust NAME {} IDS",

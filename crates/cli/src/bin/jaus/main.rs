@@ -39,6 +39,7 @@ mod recordings;
 mod replay;
 mod send;
 mod subscribe;
+mod terminal;
 mod test;
 #[cfg(target_os = "linux")]
 mod up;

@@ -1,6 +1,6 @@
 //! `jaus users`: the users of the operator's page.
 
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal as _};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -10,6 +10,7 @@ use jaus_cli::output::{Output, say};
 use jaus_ocu::users::{self, PasswordHash, User, UserRole, UsersFile};
 use serde_json::json;
 
+use crate::terminal::ask_twice;
 use crate::uptake::with_uptake;
 
 /// Choose the users of the operator's page
@@ -143,20 +144,15 @@ impl Add {
     }
 }
 
-/// Reads a password twice from the terminal without showing it, or a line of standard input.
+/// Reads a password twice from the terminal, or a line of standard input.
 fn read_password() -> Result<String, Failure> {
-    let failed = |error: io::Error| Failure::new(format!("cannot read the password: {error}"));
-    if !io::stdin().is_terminal() {
-        let mut line = String::new();
-        io::stdin().read_line(&mut line).map_err(failed)?;
-        return Ok(line.trim_end_matches(['\r', '\n']).to_owned());
+    if io::stdin().is_terminal() {
+        return ask_twice("Password");
     }
-    let password = rpassword::prompt_password("Password: ").map_err(failed)?;
-    let again = rpassword::prompt_password("Again: ").map_err(failed)?;
-    if password != again {
-        return Err(Failure::new("the passwords differ: try again"));
-    }
-    Ok(password)
+    let mut line = String::new();
+    let read = io::stdin().read_line(&mut line);
+    read.map_err(|error| Failure::new(format!("cannot read the password: {error}")))?;
+    Ok(line.trim_end_matches(['\r', '\n']).to_owned())
 }
 
 impl Remove {

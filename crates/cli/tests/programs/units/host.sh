@@ -51,7 +51,7 @@ setting() { # UNIT KEY
 
 declare -A processes
 start() { # UNIT
-    local unit=$1 user group kind name folder source writable=()
+    local unit=$1 user group kind name folder source writable=() variables=()
     user=$(setting "$unit" User) group=$(setting "$unit" Group)
     for kind in State:/var/lib Logs:/var/log Runtime:/run; do
         name=$(setting "$unit" "${kind%:*}Directory")
@@ -61,6 +61,7 @@ start() { # UNIT
         chown "$user:$group" "$folder"
         chmod "$(setting "$unit" "${kind%:*}DirectoryMode")" "$folder"
         writable+=("$folder")
+        variables+=("$(tr a-z A-Z <<<"${kind%:*}")_DIRECTORY=$folder")
     done
     local credentials=/run/credentials/$unit.service
     mkdir -p "$credentials"
@@ -82,17 +83,18 @@ start() { # UNIT
         # ProtectSystem=strict, PrivateTmp=yes.
         for folder in / /etc /var/log /var/lib /run /run/programs; do mount -o remount,bind,ro "$folder"; done
         mount -t tmpfs tmpfs /tmp
-        user=$1 group=$2 capabilities=$3 credentials=$4 directory=$5 command=$6
+        user=$1 group=$2 capabilities=$3 variables=$4 directory=$5 command=$6
         shift 6
         for folder in "$@"; do
             mount --bind "$folder" "$folder"
             mount -o remount,bind,rw "$folder"
         done
         cd "${directory:-/}"
-        exec env -i PATH=/usr/bin:/bin "CREDENTIALS_DIRECTORY=$credentials" \
+        exec env -i PATH=/usr/bin:/bin $variables \
             setpriv --reuid="$user" --regid="$group" --clear-groups --no-new-privs --bounding-set="$capabilities" \
             --inh-caps="$capabilities" --ambient-caps="$capabilities" $command' \
-        - "$user" "$group" "$capabilities" "$credentials" "$directory" "$command" "${writable[@]}" \
+        - "$user" "$group" "$capabilities" "CREDENTIALS_DIRECTORY=$credentials ${variables[*]}" \
+        "$directory" "$command" "${writable[@]}" \
         >"$work/$unit.log" 2>&1 &
     processes[$unit]=$!
 }

@@ -161,3 +161,8 @@ fn the_recipe_for_the_black_box_works_as_its_user() {
 fn a_program_without_grants_says_at_its_start_that_every_host_may_command() {
     follow("plain.sh");
 }
+
+#[test]
+fn the_parts_of_a_board_run_as_users_of_their_own_on_one_node() {
+    follow("parts.sh");
+}

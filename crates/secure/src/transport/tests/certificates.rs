@@ -29,7 +29,7 @@ struct Team {
 impl Team {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let authority = CertificateAuthority::create(folder.path(), "team", at(NOW)).unwrap();
+        let authority = CertificateAuthority::create(folder.path(), "team", None, at(NOW)).unwrap();
         Self { folder, authority }
     }
 

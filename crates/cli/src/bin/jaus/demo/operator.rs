@@ -7,7 +7,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Control, Update, When};
 use jaus::messages::mobility::{QueryLocalPose, local_pose_sensor};
 use jaus_cli::failure::Failure;
-use jaus_cli::output::quoted;
+use jaus_text::quoted;
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, ReportMission, SetDestination, mission_planner,

@@ -56,7 +56,11 @@ fn key(secure: &Secure) -> Finding {
     match secure.key() {
         Ok(key) => Finding::ok(
             CHECK,
-            format_args!("the key of this node is {}", key.public()),
+            format_args!(
+                "the key of this node is {}; cryptography by {}",
+                key.public(),
+                jaus_secure::crypto_library()
+            ),
         ),
         Err(error) => Finding::problem(CHECK, error),
     }

@@ -117,7 +117,8 @@ impl Examine {
             };
             // The peer refuses messages from other ids.
             (settings.own, settings.wanted, settings.is_secure) = (own, None, true);
-            return Ok((Way::Secure(Sessions::open(&secure, own).await?), settings));
+            let sessions = Sessions::open(&secure, own).await?;
+            return Ok((Way::Secure(Box::new(sessions)), settings));
         }
         let mut sockets = Sockets::open(interfaces(config, self.target)?, config)?;
         settings.port = sockets.local().map_or(0, |local| local.port());
@@ -153,7 +154,7 @@ impl Examine {
 enum Way {
     Plain(Sockets),
     #[cfg(feature = "secure")]
-    Secure(Sessions),
+    Secure(Box<Sessions>),
 }
 
 impl Way {

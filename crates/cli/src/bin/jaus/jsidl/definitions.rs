@@ -1,11 +1,11 @@
 //! Loads the definitions of a subcommand and prints findings.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use jaus_cli::failure::Failure;
-use jaus_cli::output::colours_wanted;
+use jaus_cli::output::{colours_wanted, say_lines};
 use jsidl::model::Service;
 use jsidl::{Diagnostic, Diagnostics, Loaded, Loader, Style, catalogue};
 
@@ -70,11 +70,7 @@ pub(crate) fn own_services(loaded: &Loaded) -> impl Iterator<Item = &Arc<Service
 
 /// Prints a finding on standard error. Errors are ignored.
 pub(crate) fn complain(diagnostics: &Diagnostics, finding: &Diagnostic) {
-    let _ = writeln!(
-        io::stderr().lock(),
-        "{}",
-        diagnostics.excerpt(finding, style())
-    );
+    say_lines(diagnostics.excerpt(finding, style()));
 }
 
 /// Format of excerpts on this terminal.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus_cli::output::quoted;
+use jaus_text::quoted;
 use jaus_view::{Content, Dictionary, to_hex};
 
 use super::step::Form;

@@ -4,6 +4,9 @@
     reason = "certificates are issued and revoked at the time of the host"
 )]
 
+mod passphrase;
+
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
@@ -20,6 +23,7 @@ use serde_json::json;
 
 use super::Ids;
 use crate::uptake::with_uptake;
+use passphrase::{Change, Present, chosen};
 
 /// Seconds of a day.
 const DAY: u64 = 24 * 60 * 60;
@@ -34,7 +38,8 @@ const DAY: u64 = 24 * 60 * 60;
     jaus keys ca new\n  \
     jaus keys ca issue rover WkE5vXW4lFyQ3nDzGnUlnQ0Xs0mB5bqkVHk0pJ1Yd2s= 101.255.255 > rover.crt\n  \
     jaus keys ca list\n  \
-    jaus keys ca revoke rover")]
+    jaus keys ca revoke rover\n  \
+    jaus keys ca passphrase")]
 pub(super) struct Ca {
     #[command(subcommand)]
     action: Action,
@@ -42,7 +47,7 @@ pub(super) struct Ca {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Make an authority: ca.key, which stays here; ca.crt and ca.crl, which nodes need
+    /// Make an authority: ca.key, encrypted, which stays here; ca.crt and ca.crl, which nodes need
     New(New),
     /// Issue a certificate and print it
     Issue(Issue),
@@ -50,6 +55,8 @@ enum Action {
     Revoke(Revoke),
     /// List the issued certificates
     List(List),
+    /// Change the passphrase of ca.key, or encrypt a key that had none
+    Passphrase(Change),
 }
 
 #[derive(Args)]
@@ -64,6 +71,15 @@ struct New {
     /// The authority's name, without blanks
     #[arg(default_value = "jaus")]
     name: String,
+
+    /// Read the passphrase that encrypts ca.key from the first line of this file, such as /dev/stdin
+    /// or <(pass show ca), instead of the terminal
+    #[arg(long, value_name = "FILE", conflicts_with = "unencrypted")]
+    passphrase_file: Option<PathBuf>,
+
+    /// Leave the key unencrypted: whoever copies the file can issue certificates
+    #[arg(long)]
+    unencrypted: bool,
 
     #[command(flatten)]
     folder: Folder,
@@ -86,6 +102,9 @@ struct Issue {
     life: Duration,
 
     #[command(flatten)]
+    present: Present,
+
+    #[command(flatten)]
     folder: Folder,
 }
 
@@ -94,6 +113,9 @@ struct Revoke {
     /// The name of the node, for all its certificates; or the serial number of one
     #[arg(value_name = "NAME|SERIAL")]
     which: String,
+
+    #[command(flatten)]
+    present: Present,
 
     #[command(flatten)]
     folder: Folder,
@@ -107,6 +129,11 @@ struct List {
 
     #[command(flatten)]
     folder: Folder,
+}
+
+/// The failure to read the files of an authority.
+fn missing(error: impl Display) -> Failure {
+    Failure::new(format!("{error}; `jaus keys ca new` makes an authority"))
 }
 
 /// The life of a certificate.
@@ -127,6 +154,7 @@ impl Ca {
             Action::Issue(it) => it.issue(),
             Action::Revoke(it) => it.revoke(),
             Action::List(it) => it.list(),
+            Action::Passphrase(it) => it.run(),
         }
     }
 }
@@ -138,20 +166,17 @@ impl Folder {
             None => Ok(KeyFiles::folder()?.join("ca")),
         }
     }
-
-    fn open(&self) -> Result<CertificateAuthority, Failure> {
-        let open = CertificateAuthority::open(&self.path()?);
-        open.map_err(|error| {
-            Failure::new(format!("{error}; `jaus keys ca new` makes an authority"))
-        })
-    }
 }
 
 impl New {
     fn make(&self) -> Result<Outcome, Failure> {
         let path = self.folder.path()?;
         make_folder_of(&path.join("ca.key"))?;
-        CertificateAuthority::create(&path, &self.name, SystemTime::now()).map_err(Failure::of)?;
+        let file = self.passphrase_file.as_deref();
+        let passphrase = chosen(file, self.unencrypted, "--passphrase-file")?;
+        let now = SystemTime::now();
+        CertificateAuthority::create(&path, &self.name, passphrase.as_ref(), now)
+            .map_err(Failure::of)?;
         say(format_args!(
             "the authority is in {}; copy its ca.crt and ca.crl, never its ca.key, to each node",
             path.display()
@@ -168,7 +193,7 @@ impl Issue {
             ids: self.ids.0.clone(),
             life: self.life,
         };
-        let authority = self.folder.open()?;
+        let authority = self.present.open(&self.folder)?;
         let pem = authority
             .issue(&request, SystemTime::now())
             .map_err(Failure::of)?;
@@ -180,8 +205,9 @@ impl Issue {
 impl Revoke {
     fn revoke(&self) -> Result<Outcome, Failure> {
         let list = self.folder.path()?.join("ca.crl");
+        let authority = self.present.open(&self.folder)?;
         with_uptake(&list, || {
-            let revoked = self.folder.open()?.revoke(&self.which, SystemTime::now());
+            let revoked = authority.revoke(&self.which, SystemTime::now());
             let revoked = revoked.map_err(Failure::of)?;
             if revoked.is_empty() {
                 return Err(Failure::negative(format!(
@@ -201,7 +227,7 @@ impl Revoke {
 
 impl List {
     fn list(&self) -> Result<Outcome, Failure> {
-        let issued = self.folder.open()?.issued().map_err(Failure::of)?;
+        let issued = CertificateAuthority::issued(&self.folder.path()?).map_err(missing)?;
         let (mut output, now) = (Output::new(), SystemTime::now());
         for it in &issued {
             let state = state(it, now);

@@ -31,6 +31,12 @@ pub(super) struct Rotate {
 impl Rotate {
     pub(super) fn run(&self) -> Result<Outcome, Failure> {
         let path = self.files.key()?;
+        if Key::is_in_token(&path) {
+            return Err(Failure::new(
+                "a key in a token is replaced by another one: make it with `jaus keys new` and another \
+                 `object`, let the peers trust it, and start the node with its URI",
+            ));
+        }
         if self.finish {
             finish(&path)
         } else {

@@ -6,7 +6,8 @@ use terminal_size::{Height, Width, terminal_size};
 
 use super::sample::{DropRow, LinkRow, PeerRow, View};
 use jaus_cli::failure::Failure;
-use jaus_cli::output::{Output, colours_wanted, disturbs_terminal};
+use jaus_cli::output::{Output, colours_wanted};
+use jaus_text::visible;
 
 /// Maximum number of rows without a limit and without a terminal.
 const MOST: usize = 1000;
@@ -243,12 +244,12 @@ fn short(number: f64) -> String {
     format!("{number:.0}G")
 }
 
-/// Shortens a text and marks the cut; drops characters with which a peer's name could disturb the
-/// terminal.
+/// Shortens a peer's name, in printable characters, and marks the cut.
 fn clipped(text: &str, width: usize) -> String {
-    let mut visible = text.chars().filter(|&c| !disturbs_terminal(c));
-    let mut clipped: String = visible.by_ref().take(width).collect();
-    if visible.next().is_some() {
+    let shown = visible(text);
+    let mut rest = shown.chars();
+    let mut clipped: String = rest.by_ref().take(width).collect();
+    if rest.next().is_some() {
         clipped.pop();
         clipped.push('…');
     }
@@ -304,7 +305,7 @@ mod tests {
         }
         assert_eq!(clipped("Rover", 10), "Rover");
         assert_eq!(clipped("a very long name", 10), "a very lo…");
-        assert_eq!(clipped("\x1b[2Jevil", 10), "[2Jevil");
-        assert_eq!(clipped("\u{202e}revoR", 10), "revoR");
+        assert_eq!(clipped("\x1b[2Jevil", 10), r"\u{1b}[2J…");
+        assert_eq!(clipped("\u{202e}revoR", 16), r"\u{202e}revoR");
     }
 }

@@ -249,11 +249,13 @@ impl<'d> Watcher<'d> {
     fn handle(&mut self, packet: &Packet, now: Instant) -> Option<Trigger> {
         let frame = packet.frame();
         let datagrams = self.network.handle_frame(&frame);
-        let entries = datagrams
-            .iter()
-            .flat_map(|datagram| self.messages.read_datagram(frame.time, datagram));
+        let entries = datagrams.iter().flat_map(|datagram| {
+            let entries = self.messages.read_datagram(frame.time, datagram);
+            let from = Some(datagram.source.ip());
+            entries.into_iter().map(move |entry| (entry, from))
+        });
         entries
-            .filter_map(|entry| self.triggers.handle_entry(&entry, now))
+            .filter_map(|(entry, from)| self.triggers.handle_entry(&entry, from, now))
             .last()
     }
 }

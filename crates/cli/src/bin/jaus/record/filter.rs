@@ -6,11 +6,13 @@ use std::net::{IpAddr, SocketAddr};
 use bytes::Bytes;
 use etherparse::{LaxNetSlice, LaxSlicedPacket, TransportSlice, ip_number};
 use jaus::wire::judp;
+use jaus_limits::{first_of_largest, quota_address};
 
 use super::connections::{Connections, Segment};
 use crate::packets::Packet;
 
-/// Maximum number of packets with pending fragments.
+/// Maximum number of packets with pending fragments. Beyond it the oldest of the sender with the most is
+/// forgotten.
 const FRAGMENTED: usize = 64;
 
 /// Common key of an IP packet's fragments.
@@ -59,7 +61,8 @@ impl Filter {
         let wanted = self.first_is_jaus(sliced);
         if wanted {
             if self.fragmented.len() == FRAGMENTED {
-                self.fragmented.pop_front();
+                let place = first_of_largest(&self.fragmented, |it| quota_address(it.0));
+                place.and_then(|place| self.fragmented.remove(place));
             }
             self.fragmented.push_back(whole);
         }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use jaus_cli::failure::Failure;
 use jaus_cli::output;
+use jaus_text::shortened;
 use tokio::sync::watch;
 
 /// Maximum number of lines queued for a slow terminal.
@@ -93,20 +94,16 @@ impl Console {
 }
 
 impl PrefixedConsole {
-    /// Prints a line; shows a mark in place of characters that would disturb the terminal.
+    /// Prints a line in printable characters.
     pub(super) fn say(&self, line: &str) {
-        let visible: String = line.chars().map(visible).collect();
-        self.console.line(format!("{}{visible}\n", self.prefix));
+        self.console
+            .line(format!("{}{}\n", self.prefix, printable(line)));
     }
 }
 
-/// The character, or what is shown in its place.
-fn visible(c: char) -> char {
-    match c {
-        '\t' => ' ',
-        c if output::disturbs_terminal(c) => char::REPLACEMENT_CHARACTER,
-        c => c,
-    }
+/// A part's line, with escapes in place of what would disturb the terminal. Its reader has cut it.
+fn printable(line: &str) -> String {
+    shortened(&line.replace('\t', " "), usize::MAX).into_owned()
 }
 
 impl Printer {
@@ -149,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_line_of_a_part_neither_moves_the_cursor_nor_reverses_the_text() {
-        let shown: String = "a\tb\x1b[2J \u{202e}gpj.exe".chars().map(visible).collect();
-        assert_eq!(shown, "a b\u{fffd}[2J \u{fffd}gpj.exe");
+        let shown = printable("a\tb\x1b[2J \u{202e}gpj.exe");
+        assert_eq!(shown, r"a b\u{1b}[2J \u{202e}gpj.exe");
     }
 }

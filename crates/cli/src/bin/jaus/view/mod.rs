@@ -15,7 +15,7 @@ use tokio::net::TcpListener;
 
 use crate::debug_view::usual_address;
 use crate::definitions::Definitions;
-use source::Source;
+use source::{Arrival, Source};
 
 /// Serve live messages to Foxglove, as a Foxglove WebSocket connection
 ///
@@ -66,12 +66,12 @@ pub(crate) struct View {
     run_for: RunFor,
 }
 
-/// Says that samples were left out for want of channels, unless it `is_full` already.
+/// Says that samples are left out for want of channels, unless it `is_full` already.
 fn say_once_when_full(left_out: u64, is_full: &mut bool) {
     if left_out > 0 && !std::mem::replace(is_full, true) {
         say(format_args!(
-            "all {MOST_CHANNELS} channels are taken: viewers get no messages of further components or kinds; choose \
-             some with --filter, and start again"
+            "messages are left out: there are {MOST_CHANNELS} channels, at most half of them for one network address; \
+             those without messages for 10 s give way; choose some with --filter"
         ));
     }
 }
@@ -83,7 +83,7 @@ impl View {
             let listener = self.listen().await?;
             let mut source = self.source(&dictionary).await?;
             let (server, sharing) = Server::new(self.settings());
-            let mut channels = Channels::new(&dictionary);
+            let mut channels = Channels::live(&dictionary);
             let mut is_full = false;
             self.announce(&listener)?;
             let serving = server.serve(listener);
@@ -94,9 +94,9 @@ impl View {
                     () = &mut end => return Ok(Outcome::Done),
                     never = &mut serving => match never {},
                     messages = source.next() => {
-                        for (entry, time) in messages? {
+                        for Arrival { entry, from, time } in messages? {
                             if self.filter.iter().all(|filter| filter.passes(&entry)) {
-                                let samples = channels.handle_entry(&entry, time);
+                                let samples = channels.handle_entry(&entry, from, time);
                                 sharing.publish(&channels, &samples);
                                 say_once_when_full(channels.left_out(), &mut is_full);
                             }

@@ -1,5 +1,6 @@
 //! Where the messages come from: a debug view, or network interfaces.
 
+use std::net::{IpAddr, SocketAddr};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use jaus::link::Group;
@@ -32,8 +33,14 @@ enum Origin {
     },
 }
 
-/// A message, and its time in nanoseconds since 1970.
-type Timed = (Entry, u64);
+/// A message that has arrived.
+pub(super) struct Arrival {
+    pub(super) entry: Entry,
+    /// The network address that it came from, if it came from another host.
+    pub(super) from: Option<IpAddr>,
+    /// Nanoseconds since 1970.
+    pub(super) time: u64,
+}
 
 impl<'d> Source<'d> {
     /// Connects to a debug view.
@@ -67,12 +74,12 @@ impl<'d> Source<'d> {
     }
 
     /// Waits for messages. A debug view that has gone is awaited.
-    pub(super) async fn next(&mut self) -> Result<Vec<Timed>, Failure> {
+    pub(super) async fn next(&mut self) -> Result<Vec<Arrival>, Failure> {
         match &mut self.origin {
             Origin::DebugView { address, view } => {
                 let text = next_text(address, view).await;
                 match self.messages.read_json(&text) {
-                    Ok(entry) => Ok(entry.into_iter().map(timed).collect()),
+                    Ok(entry) => Ok(entry.into_iter().map(arrival).collect()),
                     Err(_) => Err(Failure::new(format!("{address} sends no JSON objects"))),
                 }
             }
@@ -82,7 +89,12 @@ impl<'d> Source<'d> {
                     for datagram in network.handle_frame(&packet.frame()) {
                         let entries = self.messages.read_datagram(Some(packet.time), &datagram);
                         let time = nanoseconds(packet.time);
-                        messages.extend(entries.into_iter().map(|entry| (entry, time)));
+                        let from = Some(datagram.source.ip());
+                        messages.extend(entries.into_iter().map(|entry| Arrival {
+                            entry,
+                            from,
+                            time,
+                        }));
                     }
                 }
                 Ok(messages)
@@ -112,13 +124,21 @@ async fn next_text(address: &str, view: &mut Option<DebugView>) -> String {
     }
 }
 
-/// The message with its time, or the time of day.
-fn timed(entry: Entry) -> Timed {
+/// A message of a debug view, with its time, or the time of day.
+fn arrival(entry: Entry) -> Arrival {
     let time = entry
         .text("time")
         .and_then(|time| time.parse::<Timestamp>().ok());
     let time = time.map_or_else(now, nanoseconds);
-    (entry, time)
+    // The peer of outgoing messages is their destination.
+    let is_foreign = matches!(entry.text("direction"), Some("received" | "passing"));
+    let peer = entry.text("peer").filter(|_| is_foreign);
+    let from = peer.and_then(|peer| peer.parse::<SocketAddr>().ok());
+    Arrival {
+        from: from.map(|it| it.ip()),
+        entry,
+        time,
+    }
 }
 
 /// The time of day in nanoseconds since 1970.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use jaus_cli::output::quoted;
+use jaus_text::quoted;
 use jaus_view::{Entry, Timestamp};
 
 /// Maximum number of kinds, as an attacker may invent more.

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use jaus_files::Readers;
+
 use super::*;
 
 /// A host that keeps the authority, and issues certificates for the others.
@@ -10,7 +12,7 @@ struct Office(Host);
 impl Office {
     fn new() -> Self {
         let office = Self(Host::new());
-        let made = office.ca(&["new"]);
+        let made = office.ca(&["new", "--unencrypted"]);
         assert_eq!(made.status, 0, "{made:?}");
         office
     }
@@ -140,11 +142,8 @@ fn certificates_are_listed_and_bad_requests_say_what_to_do() {
     assert!(missing.stderr.contains("jaus keys ca new"), "{missing:?}");
 
     let office = Office::new();
-    assert_eq!(
-        office.ca(&["new"]).status,
-        2,
-        "an authority is not replaced"
-    );
+    let again = office.ca(&["new", "--unencrypted"]);
+    assert_eq!(again.status, 2, "an authority is not replaced: {again:?}");
     assert_eq!(office.ca(&["list"]).status, 1, "nothing is issued");
     for (ids, life) in [
         ("101.1", "30d"),
@@ -161,4 +160,80 @@ fn certificates_are_listed_and_bad_requests_say_what_to_do() {
     let listed = office.ca(&["list", "--json"]).only_line();
     assert_eq!(listed["state"], "revoked");
     assert_eq!(listed["ids"][1], "102.1.1");
+}
+
+/// The folder of an authority with files of passphrases.
+fn office_with(passphrases: &[(&str, &str)]) -> Office {
+    let office = Office(Host::new());
+    for (name, passphrase) in passphrases {
+        let path = office.0.file(name);
+        jaus_files::create(path.as_ref(), Readers::Owner, passphrase.as_bytes()).unwrap();
+    }
+    office
+}
+
+#[test]
+fn the_key_of_an_authority_is_encrypted_unless_that_is_refused() {
+    let office = office_with(&[
+        ("passphrase", "correct horse battery\n"),
+        ("wrong", "incorrect horse"),
+    ]);
+    let refused = office.ca(&["new"]);
+    assert_eq!(refused.status, 2, "{refused:?}");
+    assert!(
+        refused
+            .stderr
+            .contains("--passphrase-file, or --unencrypted"),
+        "{refused:?}"
+    );
+
+    let [right, wrong] =
+        ["passphrase", "wrong"].map(|it| format!("--passphrase-file={}", office.0.file(it)));
+    let made = office.ca(&["new", &right]);
+    assert_eq!(made.status, 0, "{made:?}");
+    let text = std::fs::read_to_string(office.0.file("ca/ca.key")).unwrap();
+    assert!(text.contains("BEGIN ENCRYPTED PRIVATE KEY"), "{text}");
+
+    let key = host().keys(&["show"]).stdout;
+    let issue = |flags: &[&str]| {
+        office.ca(&[&["issue", "rover", key.trim(), "101.255.255"], flags].concat())
+    };
+    for (flags, why) in [
+        (&[][..], "use --passphrase-file"),
+        (&[&*wrong], "with another passphrase"),
+    ] {
+        let refused = issue(flags);
+        assert_eq!((refused.status, &*refused.stdout), (2, ""), "{refused:?}");
+        assert!(refused.stderr.contains(why), "{refused:?}");
+    }
+    assert_eq!(issue(&[&right]).status, 0);
+    assert_eq!(office.ca(&["list"]).status, 0, "the list needs no key");
+    assert_eq!(office.ca(&["revoke", "rover", &right]).status, 0);
+}
+
+#[test]
+fn a_key_without_a_passphrase_still_works_and_the_tool_says_how_to_encrypt_it() {
+    let office = office_with(&[("passphrase", "correct horse battery\n")]);
+    assert_eq!(office.ca(&["new", "--unencrypted"]).status, 0);
+    let key = host().keys(&["show"]).stdout;
+    let issue = ["issue", "rover", key.trim(), "101.255.255"];
+    let issued = office.ca(&issue);
+    assert_eq!(issued.status, 0, "{issued:?}");
+    assert!(
+        issued
+            .stderr
+            .contains("`jaus keys ca passphrase` encrypts it"),
+        "{issued:?}"
+    );
+
+    let file = office.0.file("passphrase");
+    let encrypted = office.ca(&["passphrase", "--new-passphrase-file", &file]);
+    assert_eq!(encrypted.status, 0, "{encrypted:?}");
+    assert_eq!(office.ca(&issue).status, 2);
+    let given = [&issue[..], &["--passphrase-file", &file]].concat();
+    let issued = office.ca(&given);
+    assert_eq!((issued.status, &*issued.stderr), (0, ""), "{issued:?}");
+    let plain = office.ca(&["passphrase", "--passphrase-file", &file, "--unencrypted"]);
+    assert_eq!(plain.status, 0, "{plain:?}");
+    assert_eq!(office.ca(&issue).status, 0);
 }

@@ -1,12 +1,11 @@
-//! Limits of a server that shows traffic or values: numbers of connections and pages, of which one network address
-//! gets only a share.
+//! Numbers of connections and pages of a server, of which one network address gets only a share.
 
 use std::collections::HashMap;
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use jaus::endpoint::quota_address;
+use crate::quota_address;
 
 /// The network address of a client, as far as limits tell addresses apart: of IPv6 the first 64
 /// bits, because a host chooses the others at will.

@@ -1,0 +1,80 @@
+//! Nodes whose TLS is of different libraries of cryptographic primitives.
+
+use std::fs;
+
+use rustls::crypto::{CryptoProvider, aws_lc_rs, ring};
+use rustls::pki_types::{PrivatePkcs8KeyDer, pem::PemObject as _};
+
+use super::*;
+
+const LIBRARIES: [fn() -> CryptoProvider; 2] =
+    [ring::default_provider, aws_lc_rs::default_provider];
+
+/// A vehicle and an operator with TLS of these libraries, after a second.
+fn with_libraries(vehicle: CryptoProvider, operator: CryptoProvider) -> Network {
+    let keys = [key(), key()];
+    let trust = [
+        trusting([peer("operator", &keys[1], "60.255.255")]),
+        trusting([peer("rover", &keys[0], "101.255.255")]),
+    ];
+    let [at_vehicle, at_operator] = [0, 1].map(|it| {
+        let (key, trust) = (keys[it].clone(), trust[it].clone());
+        Credentials::pinned(key, trust)
+    });
+    let mut network = Network::new();
+    network.add_with(at_vehicle.with_provider(vehicle), &[]);
+    network.add_with(at_operator.with_provider(operator), &[address(1)]);
+    network.run(SECOND);
+    network
+}
+
+#[test]
+fn nodes_of_all_libraries_exchange_datagrams_both_ways() {
+    for vehicle in LIBRARIES {
+        for operator in LIBRARIES {
+            let mut network = with_libraries(vehicle(), operator());
+            let (report, command) = (judp("101.1.33", 20), judp("60.1.1", 900));
+            network.send(0, Priority::Standard, &report);
+            network.send(1, Priority::High, &command);
+            network.run(SECOND);
+            assert_eq!(network.hosts[1].received, [report]);
+            assert_eq!(network.hosts[0].received, [command]);
+        }
+    }
+}
+
+#[test]
+fn two_nodes_of_aws_lc_rs_agree_on_a_hybrid_key_exchange() {
+    let group = |provider: CryptoProvider| provider.kx_groups[0].name();
+    let hybrid = rustls::NamedGroup::X25519MLKEM768;
+    assert_eq!(group(aws_lc_rs::default_provider()), hybrid);
+    assert_ne!(group(ring::default_provider()), hybrid);
+    // With this exchange alone there is a session as well.
+    let mut only = aws_lc_rs::default_provider();
+    only.kx_groups.truncate(1);
+    let network = with_libraries(aws_lc_rs::default_provider(), only);
+    assert!(network.session(1).is_some());
+}
+
+#[test]
+fn a_key_made_with_one_library_is_read_by_the_other() {
+    let made_by_ring = {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("node.key");
+        Key::create(&path).unwrap();
+        fs::read(&path).unwrap()
+    };
+    let made_by_aws_lc = {
+        let random = ::aws_lc_rs::rand::SystemRandom::new();
+        let document = ::aws_lc_rs::signature::Ed25519KeyPair::generate_pkcs8(&random).unwrap();
+        crate::key::pem("PRIVATE KEY", document.as_ref()).into_bytes()
+    };
+    for pem in [made_by_ring, made_by_aws_lc] {
+        let [first, second] = LIBRARIES.map(|library| {
+            let der = PrivatePkcs8KeyDer::from_pem_slice(&pem).unwrap();
+            let key = library().key_provider.load_private_key(der.into()).unwrap();
+            key.public_key().unwrap().to_vec()
+        });
+        assert_eq!(first, second);
+    }
+}
