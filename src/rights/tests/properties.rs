@@ -53,8 +53,11 @@ fn plain() -> impl Strategy<Value = Vec<u8>> {
     prop::sample::select(PLAIN.to_vec()).prop_map(<[u8]>::to_vec)
 }
 
+/// A message to a component, by octets.
+type Sent = (JausId, Vec<u8>);
+
 /// A message with others in it, and each of these with the component that is to obey it.
-fn carrier() -> impl Strategy<Value = (JausId, Vec<u8>, Vec<(JausId, Vec<u8>)>)> {
+fn carrier() -> impl Strategy<Value = (JausId, Vec<u8>, Vec<Sent>)> {
     let inner = plain().prop_recursive(3, 12, 2, |inner| {
         prop_oneof![
             inner.clone().prop_map(|it| element(&it)),
