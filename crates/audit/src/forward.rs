@@ -1,5 +1,9 @@
 //! Forwards entries to journald, or by syslog (RFC 5424) to another host, where who changes this host's
 //! files does not reach them.
+#![expect(
+    clippy::disallowed_types,
+    reason = "the thread of the log owns the socket to another host, which is no link of JAUS"
+)]
 
 use std::fmt;
 use std::io;

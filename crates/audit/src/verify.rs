@@ -268,7 +268,7 @@ mod tests {
         assert_eq!(text.lines().count(), 3, "{text}");
         let name = oldest.file_name().unwrap().to_str().unwrap().to_owned();
         edit(&oldest, |lines| {
-            lines[0] = lines[0].replace("console", "nobody")
+            lines[0] = lines[0].replace("console", "nobody");
         });
         assert!(broken(&path).starts_with(&format!("{name}:2: the line before was changed")));
         fs::write(&oldest, &text).unwrap();
