@@ -272,7 +272,7 @@ impl EventLog {
             vehicle,
             kind,
             level,
-            text: shortened(text, Self::MOST_TEXT).into_owned(),
+            text: shortened(text, Self::MOST_TEXT - 1).into_owned(),
         });
         if self.events.len() > Self::MOST {
             self.drop_one();
