@@ -10,7 +10,7 @@ use super::texts;
 /// Pages that name tests as evidence.
 const PAGES: [&str; 2] = ["docs/security.md", "docs/hardening.md"];
 /// Folders with tests.
-const SOURCES: [&str; 3] = ["src", "tests", "crates"];
+const SOURCES: [&str; 4] = ["src", "tests", "crates", "jsidl/tests"];
 
 /// The quoted names of tests in the tables of a page, without their modules: words joined by at least
 /// three underscores.
