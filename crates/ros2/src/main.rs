@@ -63,7 +63,7 @@ struct Flags {
     /// authority; the higher one wins. clear-emergency: clear the emergencies that ROS has set. with=IDS,
     /// only=NAMES and except=NAMES limit this, as in the file of trusted keys.
     #[arg(long, value_name = "RIGHTS")]
-    allow: Option<Rules>,
+    rights: Option<Rules>,
 
     /// The highest speed of cmd_vel, and the speed that a primitive driver reaches with full effort,
     /// in m/s
@@ -169,7 +169,7 @@ impl Flags {
             only: self.component.clone(),
         });
         settings.rate_hz = self.rate;
-        if let Some(rules) = &self.allow {
+        if let Some(rules) = &self.rights {
             settings.rules = rules.clone();
         }
         settings.drive.timeout = self.timeout;
@@ -193,17 +193,17 @@ impl Ready for Flags {
     const ABOUT: &'static str = "Bridge between a JAUS vehicle and ROS 2 over zenoh (rmw_zenoh)";
     const EXAMPLES: &'static str = "Examples:\n  \
         jaus-ros2 --vehicle 101                              read-only, router on this host\n  \
-        jaus-ros2 --vehicle 101 --allow control=127 --tf     ROS drives: /v101/cmd_vel, /v101/goal_pose\n  \
+        jaus-ros2 --vehicle 101 --rights control=127 --tf     ROS drives: /v101/cmd_vel, /v101/goal_pose\n  \
         jaus-ros2 --vehicle 101 --connect tcp/192.168.7.2:7447 --domain 7\n  \
         jaus-ros2 --vehicle 101 --report ReportWrenchEffort --report ReportStatus --rate 5\n  \
-        jaus-ros2 --vehicle 101 --max-speed 6 --max-yaw-rate 0.8 --allow \"control=127 clear-emergency\"";
+        jaus-ros2 --vehicle 101 --max-speed 6 --max-yaw-rate 0.8 --rights \"control=127 clear-emergency\"";
     const ID: JausId = JausId::new(253, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
     const SUBSYSTEM: &'static str = "ROS 2 bridge";
 
     fn part(self) -> Result<impl Part, Failure> {
         self.check_components()?;
-        if let Some(rules) = &self.allow {
+        if let Some(rules) = &self.rights {
             rules.verify(&Table::default()).map_err(Failure::of)?;
         }
         let reports = self.reports()?;

@@ -24,8 +24,8 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
         (&["--max-speed", "0"], "0.05 to 100"),
         (&["--timeout", "3s"], "50ms to 2s"),
         (&["--component", "102.1.1"], "not a part of --vehicle 101"),
-        (&["--allow", "drive"], "control=AUTHORITY"),
-        (&["--allow", "control=1 only=Drive"], "`Drive`"),
+        (&["--rights", "drive"], "control=AUTHORITY"),
+        (&["--rights", "control=1 only=Drive"], "`Drive`"),
         (&["--report", "ReportWrenchEfort"], "ReportWrenchEffort?"),
         (
             &["--report", "ReportStatus", "--all-reports"],
@@ -39,7 +39,7 @@ fn a_mistake_in_a_flag_is_refused_with_its_remedy() {
 
 #[test]
 fn the_help_begins_with_what_it_is_and_ends_with_examples() {
-    let example = "jaus-ros2 --vehicle 101 --allow control=127";
+    let example = "jaus-ros2 --vehicle 101 --rights control=127";
     assert_help(&mut program(&[]), "Bridge between a JAUS vehicle", example);
 }
 

@@ -115,7 +115,7 @@ impl BridgeState<'_> {
             obstacle => (Level::Warn, obstacle),
         };
         let authority = self.authority.map_or_else(
-            || "none (--allow gives ROS rights)".to_owned(),
+            || "none (--rights gives ROS rights)".to_owned(),
             |authority| authority.to_string(),
         );
         let mut values = vec![

@@ -86,7 +86,7 @@ impl Bridge {
 fn warn_without_proof(network: &NetworkSettings) -> Result<(), SessionError> {
     if let Err(reason) = jaus_zenoh::check_proof(&network.config()?) {
         tracing::warn!(
-            "whoever reaches this ROS network has the rights of --allow, because {reason}"
+            "whoever reaches this ROS network has the rights of --rights, because {reason}"
         );
     }
     Ok(())

@@ -211,7 +211,9 @@ impl Publisher {
             }
             // Its commands from before have arrived long ago, so this is a new run.
             Some(run) if run.is_over(now) => {
-                self.other_run = self.run.replace(new);
+                // An earlier number continues neither: otherwise one could overtake the other.
+                let before = self.run.replace(new);
+                self.other_run = before.filter(|run| !run.is_before(command));
                 Ok(went_on)
             }
             Some(_) => {

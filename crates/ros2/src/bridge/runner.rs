@@ -463,7 +463,7 @@ impl Runner {
 
 /// Why a rule forbids something, with the flag that allows it.
 fn remedy(refusal: Forbidden) -> String {
-    jaus_zenoh::remedy(refusal, "--allow")
+    jaus_zenoh::remedy(refusal, "--rights")
 }
 
 impl Drop for Runner {

@@ -146,9 +146,9 @@ fn python(network: &str, arguments: &[&str]) -> Script {
     Script::start("crates/ros2/tests/network/rover.py", &arguments).ready()
 }
 
-const CONTROL: [&str; 2] = ["--allow", "control=127 clear-emergency"];
+const CONTROL: [&str; 2] = ["--rights", "control=127 clear-emergency"];
 /// With the longest timeout, so that another reason stops the vehicle first.
-const PATIENT: [&str; 4] = ["--allow", "control=127", "--timeout", "2s"];
+const PATIENT: [&str; 4] = ["--rights", "control=127", "--timeout", "2s"];
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs packages of Python: run .ci/ros2"]

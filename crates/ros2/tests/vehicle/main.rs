@@ -99,11 +99,11 @@ async fn without_rights_nothing_is_commanded_and_no_emergency_set() {
     assert!(scene.reported_speed().await.abs() < 0.01);
     assert_eq!(scene.controller().await, 0);
     scene
-        .until(|it| it.says("rights of ROS (--allow)=20"))
+        .until(|it| it.says("rights of ROS (--rights)=20"))
         .await;
     scene.input(Input::EmergencyStop(true)).await;
     scene
-        .until(|it| it.says("emergency stops refused by the rights of ROS (--allow)=1"))
+        .until(|it| it.says("emergency stops refused by the rights of ROS (--rights)=1"))
         .await;
     tokio::time::sleep(Duration::from_secs(2)).await;
     assert!(!scene.says(": emergency"), "{}", scene.status());
