@@ -117,6 +117,12 @@ impl Acceptance {
         self.0.iter().all(|grant| grant.rules.only_watch())
     }
 
+    /// Whether this id may do more than [`Rules::watch`] allows.
+    #[must_use]
+    pub fn trusts(&self, id: JausId) -> bool {
+        grant_of(&self.0, id).is_some_and(|grant| !grant.rules.only_watch())
+    }
+
     /// Checks a message; the table tells what it needs.
     ///
     /// # Errors
@@ -263,6 +269,8 @@ mod tests {
         ] {
             let both = acceptance(&["61 except=SetEmergency", more]);
             assert!(!both.only_watches(), "{more}");
+            assert!(both.trusts(OPERATOR), "{more}");
+            assert!(!both.trusts(JausId::new(61, 1, 1)), "{more}");
         }
     }
 

@@ -93,6 +93,8 @@ pub struct Exchange {
     refused: Notices<(JausId, u16)>,
     /// The bridges that were logged because they use an id without speaking for it.
     intruders: Notices<(JausId, BridgeId)>,
+    /// The bridges that were logged because a component belongs to them.
+    owners: Notices<(JausId, BridgeId)>,
     counters: Counters,
 }
 
@@ -114,6 +116,7 @@ impl Exchange {
             phase: Phase::Opening,
             refused: Notices::default(),
             intruders: Notices::default(),
+            owners: Notices::default(),
             counters: Counters::default(),
         }
     }
@@ -245,9 +248,15 @@ impl Exchange {
     /// Notes a component of this side: `heard` is when its latest message arrived, or now if it is attached to the node.
     pub fn handle_local(&mut self, now: Instant, id: JausId, heard: Instant) {
         let is_recent = now.saturating_duration_since(heard) < LOCAL_FOR;
-        if is_recent && self.offers(id) && !self.remotes.contains(id) {
-            // What keeps it out is counted when it sends something.
-            let _ = self.enter(id, heard);
+        if !is_recent || !self.offers(id) {
+            return;
+        }
+        match self.remotes.owner(id) {
+            Some(owner) => self.note_hidden(now, id, owner),
+            None => {
+                // What keeps it out is counted when it sends something.
+                let _ = self.enter(id, heard);
+            }
         }
     }
 
@@ -435,7 +444,7 @@ impl Exchange {
             }
             self.locals.remove(&id);
             self.queue.declare(Command::Withdraw(id));
-            self.release(id);
+            self.release(now, id);
         }
         self.repeat_calls(now);
     }

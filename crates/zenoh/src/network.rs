@@ -296,7 +296,7 @@ impl Running {
             if let Ok(sample) = reply.result()
                 && let Some((router, sessions)) = declared_by(sample)
             {
-                tracing::warn!(
+                tracing::info!(
                     "{token} was declared by zenoh sessions {sessions}, says router {router}"
                 );
             }

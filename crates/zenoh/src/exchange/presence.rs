@@ -23,7 +23,7 @@ impl Exchange {
         if is_alive {
             self.handle_declared(now, key, component, from);
         } else {
-            self.handle_withdrawn(component, from);
+            self.handle_withdrawn(now, component, from);
         }
         self.repeat_calls(now);
     }
@@ -35,7 +35,13 @@ impl Exchange {
             self.remotes.claim(from, component);
             Err(Counter::OwnId)
         } else {
-            self.remotes.announce(from, component).map(drop)
+            let is_new = self.remotes.owner(component) != Some(from);
+            let announced = self.remotes.announce(from, component);
+            announced.map(|_| {
+                if is_new && self.accept.trusts(component) {
+                    self.note_owner(now, component, from);
+                }
+            })
         };
         if let Err(counter) = outcome {
             self.counters.add(counter);
@@ -45,7 +51,7 @@ impl Exchange {
         }
     }
 
-    fn handle_withdrawn(&mut self, component: JausId, from: BridgeId) {
+    fn handle_withdrawn(&mut self, now: Instant, component: JausId, from: BridgeId) {
         let was_owner = self.remotes.owner(component) == Some(from);
         let Withdrawn { closed, next } = self.remotes.withdraw(from, component);
         if let Some(session) = closed {
@@ -54,25 +60,43 @@ impl Exchange {
         if was_owner {
             // Whoever has claimed it meanwhile may be an intruder of another owner now.
             self.intruders.end(|(id, _)| *id == component);
+            self.owners.end(|(id, _)| *id == component);
         } else {
             self.intruders.end(|it| *it == (component, from));
         }
         if let Some(next) = next {
-            self.note_owner(component, next);
+            self.note_owner(now, component, next);
         }
     }
 
     /// A component is no longer one of this side. It belongs to a bridge that has declared its token.
-    pub(super) fn release(&mut self, component: JausId) {
+    pub(super) fn release(&mut self, now: Instant, component: JausId) {
         if let Some(next) = self.remotes.release(component) {
-            self.note_owner(component, next);
+            self.note_owner(now, component, next);
         }
     }
 
-    /// Logs which bridge speaks from now on for a component that belonged to another one, or to this side.
-    fn note_owner(&self, component: JausId, owner: BridgeId) {
-        let token = self.token_of(component, owner);
-        tracing::info!("{component} belongs to bridge {owner} now, by its token {token}");
+    /// Logs which bridge speaks from now on for a component that has rights, or belonged to another one or
+    /// to this side.
+    fn note_owner(&mut self, now: Instant, component: JausId, owner: BridgeId) {
+        if self.owners.is_due(now, (component, owner)) {
+            let token = self.token_of(component, owner);
+            tracing::info!("{component} belongs to bridge {owner} by its token {token}");
+            self.queue.declare(Command::Identify(token));
+        }
+    }
+
+    /// Logs once that a component is heard on this side, but belongs to a bridge: either another bridge joins
+    /// the same networks, or somebody has its id.
+    pub(super) fn note_hidden(&mut self, now: Instant, component: JausId, owner: BridgeId) {
+        if self.owners.is_due(now, (component, owner)) {
+            let token = self.token_of(component, owner);
+            tracing::info!(
+                "{component} is heard on this side, but not announced: it belongs to bridge {owner} by \
+                 its token {token}"
+            );
+            self.queue.declare(Command::Identify(token));
+        }
     }
 
     /// Logs once which bridge uses the id of a component for which it does not speak, and which bridge

@@ -169,17 +169,18 @@ async fn who_squats_an_id_is_named_with_its_session_and_frees_the_id_when_it_goe
     let token = "jaus/live/60/1/1/00000000000000aa";
     let mut squatter = Client::start(&network, &["token", token]);
     let session = squatter.line().unwrap();
-    let operator = operator(&at_operator);
-    let _other_bridge = operators.bridge("60.250.1", &flags);
     until(|| log.count(&["60.1.1 belongs to bridge 00000000000000aa", token]) > 0).await;
     until(|| log.count(&[token, "was declared by", &session]) > 0).await;
-    // Its messages are refused, but not logged one by one.
+    let operator = operator(&at_operator);
+    let (_other_bridge, other_log) = operators.bridge_with_log("60.250.1", &flags);
+    until(|| other_log.count(&["60.1.1 is heard on this side, but", token]) > 0).await;
     tokio::time::sleep(std::time::Duration::from_secs(3)).await;
     assert_eq!(log.count(&["60.1.1 belongs to bridge"]), 1);
+    assert_eq!(other_log.count(&["60.1.1 is heard on this side"]), 1);
     assert_eq!(rover.standing().controller, None);
 
     drop(squatter);
-    until(|| log.count(&["60.1.1 belongs to bridge", "now, by its token"]) > 0).await;
+    until(|| log.count(&["60.1.1 belongs to bridge"]) > 1).await;
     let driver = found(&operator).await;
     within_limit(operator.control(driver, 127)).await.unwrap();
 }
@@ -259,7 +260,11 @@ async fn nothing_acknowledged_is_lost_when_a_router_dies_and_another_takes_over(
     let (at_vehicle, at_operator) = (vehicles.node(101, 1), operators.node(60, 1));
     let (rover, operator) = (rover(&at_vehicle), operator(&at_operator));
     let flags = ["--connect", &first[..], "--connect", &second];
-    let may_command = [&flags[..], &["--accept", "60 command", "--trust-network"]].concat();
+    let may_command = [
+        &flags[..],
+        &["--accept", "60 command also=D1F0h", "--trust-network"],
+    ]
+    .concat();
     let _bridges = [
         vehicles.bridge("101.250.1", &may_command),
         operators.bridge("60.250.1", &flags),

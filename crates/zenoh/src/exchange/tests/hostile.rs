@@ -131,7 +131,8 @@ fn who_squats_an_id_is_named_once_and_frees_it_when_it_goes() {
     let mut vehicle = bridge(THERE, &["60 control=127"]);
     let token = |from| bridge(from, &[]).token_key(OPERATOR);
     announce_by(SQUATTER, now, &mut vehicle, OPERATOR);
-    assert_eq!(identified(now, &mut vehicle), [""; 0], "nobody is kept out");
+    let named = identified(now, &mut vehicle);
+    assert_eq!(named, [token(SQUATTER)], "the id has rights");
 
     announce_by(HERE, now, &mut vehicle, OPERATOR);
     let both = [token(SQUATTER), token(HERE)];
@@ -151,9 +152,25 @@ fn who_squats_an_id_is_named_once_and_frees_it_when_it_goes() {
         matches!(passed[..], [Arrival::Closed(_), Arrival::Datagram { .. }]),
         "{passed:?}"
     );
+    assert_eq!(identified(now, &mut vehicle), [token(HERE)], "the next");
     announce_by(SQUATTER, now, &mut vehicle, OPERATOR);
     let both = [token(HERE), token(SQUATTER)];
     assert_eq!(identified(now, &mut vehicle), both, "a change");
+}
+
+#[test]
+fn who_squats_an_id_is_named_on_the_side_of_the_id_too() {
+    let now = Instant::now();
+    let mut here = bridge(HERE, &[]);
+    announce_by(SQUATTER, now, &mut here, OPERATOR);
+    let token = bridge(SQUATTER, &[]).token_key(OPERATOR);
+    here.handle_local(now, OPERATOR, now);
+    assert_eq!(identified(now, &mut here), [&*token]);
+    here.handle_local(now, OPERATOR, now);
+    assert!(here.is_idle(), "once per change");
+    here.handle_token(now, &token, false);
+    here.handle_local(now, OPERATOR, now);
+    assert_eq!(here.poll_command(now), Some(Command::Announce(OPERATOR)));
 }
 
 #[test]
