@@ -168,9 +168,11 @@ mod tests {
     use super::*;
 
     fn bridge(grant: &str, trusts_network: bool) -> Result<Bridge, NetworkError> {
-        let mut settings = Settings::default();
-        settings.accept = Acceptance::new([grant.parse().unwrap()]);
-        settings.trusts_network = trusts_network;
+        let settings = Settings {
+            accept: Acceptance::new([grant.parse().unwrap()]),
+            trusts_network,
+            ..Settings::default()
+        };
         let mut network = NetworkSettings::default();
         network.connect.push("tcp/127.0.0.1:7447".to_owned());
         Bridge::new(settings, &network)

@@ -252,8 +252,8 @@ impl Drive {
     reason = "virtual time starts at any instant"
 )]
 mod tests {
+    use std::cell::Cell;
     use std::sync::OnceLock;
-    use std::sync::atomic::{AtomicI64, Ordering};
 
     use super::super::velocity::Twist;
     use super::*;
@@ -268,12 +268,15 @@ mod tests {
     /// A command forward that arrives now, later than all before.
     fn command(now: Instant, publisher: Gid, forward: f64) -> Command {
         static FIRST: OnceLock<Instant> = OnceLock::new();
-        static SEQUENCE: AtomicI64 = AtomicI64::new(1);
+        // Other tests run in other threads, and must not cause gaps.
+        thread_local! {
+            static SEQUENCE: Cell<i64> = const { Cell::new(1) };
+        }
         let passed = now.saturating_duration_since(*FIRST.get_or_init(|| now));
         Command {
             publisher,
             session: publisher,
-            sequence: SEQUENCE.fetch_add(1, Ordering::Relaxed),
+            sequence: SEQUENCE.with(|it| it.replace(it.get() + 1)),
             stamp: i64::try_from(passed.as_nanos()).unwrap(),
             arrival: now,
             twist: Twist {
