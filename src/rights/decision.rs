@@ -1,5 +1,6 @@
 //! What was decided about a message, for logs and audit logs, and the answer to a refused request.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use bytes::Bytes;
@@ -34,6 +35,20 @@ pub struct Decision {
     pub destination: JausId,
     /// What was decided.
     pub verdict: Verdict,
+    /// Whether a message that passed needs no right, such as Release Control.
+    pub is_free: bool,
+}
+
+/// How much a decision matters to who looks for what was done, the least first. Where there is no room for
+/// all, the more important ones keep theirs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Weight {
+    /// Nothing was done.
+    Refusal,
+    /// Everybody may do it.
+    Free,
+    /// It needed a right, or a component has decided about control.
+    Evidence,
 }
 
 /// What was decided.
@@ -61,7 +76,9 @@ impl Decision {
             Ok(()) if is_recorded(frame, table) => {
                 let matters = |message: &[u8]| table.needs(message).any(Permission::is_recorded);
                 let what = what(&frame.payload, table, matters);
-                Some(Self::new(frame, what, Verdict::Passed))
+                let is_free = needs_nothing(&frame.payload, table);
+                let passed = Self::new(frame, what, Verdict::Passed);
+                Some(Self { is_free, ..passed })
             }
             Ok(()) => None,
             Err(why) => {
@@ -98,6 +115,7 @@ impl Decision {
             source: frame.source,
             destination: frame.destination,
             verdict,
+            is_free: false,
         }
     }
 
@@ -105,6 +123,16 @@ impl Decision {
     #[must_use]
     pub const fn is_refusal(&self) -> bool {
         matches!(self.verdict, Verdict::Refused(_))
+    }
+
+    /// How much it matters.
+    #[must_use]
+    pub const fn weight(&self) -> Weight {
+        match self.verdict {
+            Verdict::Refused(_) => Weight::Refusal,
+            Verdict::Passed if self.is_free => Weight::Free,
+            _ => Weight::Evidence,
+        }
     }
 }
 
@@ -116,6 +144,7 @@ impl fmt::Display for Decision {
             source,
             destination,
             verdict,
+            ..
         } = self;
         write!(f, "{what} from {source} to {destination}")?;
         match verdict {
@@ -151,7 +180,7 @@ struct Inside {
     names: Vec<String>,
     further: usize,
     /// The code of each, and whether it is for all clients, which its name tells.
-    kinds: Vec<(Option<u16>, bool)>,
+    kinds: BTreeSet<(Option<u16>, bool)>,
 }
 
 impl Inside {
@@ -171,8 +200,7 @@ impl Inside {
                 table::code_of(message),
                 table.needs(message).any(clears_all),
             );
-            if matters(message) && !self.kinds.contains(&kind) {
-                self.kinds.push(kind);
+            if matters(message) && self.kinds.insert(kind) {
                 if self.names.len() < MOST_NAMES {
                     self.names.push(table.name_of(message));
                 } else {
@@ -287,6 +315,20 @@ mod tests {
             assert_eq!((allowed.source, allowed.destination), (OPERATOR, VEHICLE));
         }
         assert_eq!(decided("command", &event(WRENCH)), None);
+    }
+
+    #[test]
+    fn what_needs_a_right_outweighs_what_everybody_may_and_that_a_refusal() {
+        let weight = |rules, payload| decided(rules, payload).unwrap().weight();
+        assert_eq!(weight("control=127", REQUEST), Weight::Evidence);
+        assert_eq!(weight("", b"\x0E\x00"), Weight::Free, "Release Control");
+        assert_eq!(
+            weight("", b"\x06\x00\x01\x00"),
+            Weight::Free,
+            "Set Emergency"
+        );
+        assert_eq!(weight("", REQUEST), Weight::Refusal);
+        assert!(Weight::Refusal < Weight::Free && Weight::Free < Weight::Evidence);
     }
 
     #[test]

@@ -63,7 +63,7 @@ mod words;
 
 pub(crate) use accept::admit as admit_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
-pub use decision::{Decision, Verdict, check_unrecorded, denial};
+pub use decision::{Decision, Verdict, Weight, check_unrecorded, denial};
 pub use queue::{Decided, DecisionQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
@@ -276,7 +276,10 @@ impl Rules {
         message: &[u8],
         Within { table, depth, .. }: Within<'_>,
     ) -> Result<(), Refusal> {
-        if self.except.has_unknown(table) {
+        let is_end = |it| matches!(it, Permission::Emergency | Permission::Release);
+        let ends = table.knows(code) && table.needs(message).all(is_end);
+        // A mistake in a name must not keep a stop back.
+        if !ends && self.except.has_unknown(table) {
             return Err(Refusal::UnknownName);
         }
         let concerns = |permission: Permission| match permission {

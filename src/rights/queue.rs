@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use super::Decision;
 
-/// Decisions that may wait: of each kind, refusals and others, so that refusals do not displace what was
-/// done.
+/// Decisions that may wait: of each weight, so that refusals do not displace what was done, nor what
+/// everybody may that which needs a right.
 const MOST_WAITING: usize = 128;
 
 /// A decision about a client, such as a network address.
@@ -20,7 +20,7 @@ pub struct Decided<C> {
     pub times: u64,
 }
 
-/// Decisions that wait for the reader of an audit log: up to 128 refusals and 128 others, equal ones as one.
+/// Decisions that wait for the reader of an audit log: up to 128 of each weight, equal ones as one.
 #[derive(Debug)]
 pub struct DecisionQueue<C>(VecDeque<Decided<C>>);
 
@@ -38,9 +38,9 @@ impl<C: PartialEq> DecisionQueue<C> {
             known.times += 1;
             return true;
         }
-        let is_refusal = decision.is_refusal();
+        let weight = decision.weight();
         let alike = self.0.iter();
-        let alike = alike.filter(|it| it.decision.is_refusal() == is_refusal);
+        let alike = alike.filter(|it| it.decision.weight() == weight);
         if alike.count() >= MOST_WAITING {
             return false;
         }

@@ -50,6 +50,9 @@ pub struct Entry {
     /// How often, if more than once.
     #[serde(skip_serializing_if = "is_once")]
     pub times: u64,
+    /// Whether everybody may do it, so that it must not fill the log.
+    #[serde(skip)]
+    pub(crate) is_free: bool,
 }
 
 impl Entry {
@@ -70,6 +73,7 @@ impl Entry {
             address: None,
             key: None,
             times: 1,
+            is_free: false,
         }
     }
 
@@ -92,7 +96,10 @@ impl Entry {
             Verdict::Denied => by_component("control", Outcome::Refused),
             Verdict::Ended => by_component("end of control", Outcome::Allowed),
             // It was passed on.
-            _ => by_client(Outcome::Allowed),
+            _ => Self {
+                is_free: decision.is_free,
+                ..by_client(Outcome::Allowed)
+            },
         }
     }
 
@@ -152,6 +159,7 @@ impl Entry {
                 address,
                 key,
                 times: _,
+                is_free: _,
             } = it;
             (who, what, to, result, why, id, address, key)
                 == (

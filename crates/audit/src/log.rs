@@ -167,6 +167,10 @@ impl AuditLog {
         if !has_room || entries.try_send(entry).is_err() {
             shared.refusals.fetch_sub(one, Ordering::Relaxed);
             lost.fetch_add(1, Ordering::Relaxed);
+            if !is_refusal {
+                // A disk that hangs gives the thread no error.
+                shared.is_broken.store(true, Ordering::Relaxed);
+            }
         }
     }
 

@@ -10,9 +10,11 @@ use crate::entry::{Entry, Outcome};
 use crate::file::{Limits, LogFile};
 use crate::repeats::Repeats;
 
-/// Different entries about one client at one address: a burst, and then one each second. What is allowed to
-/// everybody, such as releases to ever new ids, fills no log.
+/// Different entries about one client at one address that are refusals, or about what everybody may do,
+/// such as releases to ever new ids: a burst, and then one each second. They fill no log.
 const SHARE: Rate = Rate::new(1, 200);
+/// The same of what needs a right.
+const EVIDENCE_SHARE: Rate = Rate::new(10, 2000);
 /// Clients with a share of their own. Others have one together.
 const MOST_CLIENTS: usize = 256;
 
@@ -22,6 +24,7 @@ pub(crate) struct Stream {
     file: LogFile,
     repeats: Repeats,
     shares: Buckets<String>,
+    evidence_shares: Buckets<String>,
     /// Entries beyond the share of their client.
     beyond: u64,
     /// The outcome of the lines about them.
@@ -34,6 +37,7 @@ impl Stream {
             file: LogFile::open(path, limits)?,
             repeats: Repeats::default(),
             shares: Buckets::new(SHARE, MOST_CLIENTS),
+            evidence_shares: Buckets::new(EVIDENCE_SHARE, MOST_CLIENTS),
             beyond: 0,
             outcome,
         })
@@ -63,7 +67,11 @@ impl Stream {
             Some(key) => key.clone(),
             None => format!("{} {address}", entry.who),
         };
-        self.shares.take(now, client)
+        let shares = match entry.is_free || entry.result == Outcome::Refused {
+            true => &mut self.shares,
+            false => &mut self.evidence_shares,
+        };
+        shares.take(now, client)
     }
 
     /// What was counted until now; all of it without a time.
@@ -114,14 +122,23 @@ mod tests {
         for index in 0..10_000 {
             let release = Entry::new("tablet", "ReleaseControl", Outcome::Allowed);
             let entry = release.to(index).address(format_args!("10.0.0.2:{index}"));
-            stream.note(start, &entry.key("key of the tablet")).unwrap();
+            let entry = Entry {
+                is_free: true,
+                ..entry.key("key of the tablet")
+            };
+            stream.note(start, &entry).unwrap();
         }
-        let evidence = Entry::new("console", "RequestControl", Outcome::Allowed);
-        assert!(stream.note(start, &evidence).unwrap().is_some());
+        // What needs a right is recorded, of others and of the same client.
+        for evidence in [
+            Entry::new("console", "RequestControl", Outcome::Allowed),
+            Entry::new("tablet", "RequestControl", Outcome::Allowed).key("key of the tablet"),
+        ] {
+            assert!(stream.note(start, &evidence).unwrap().is_some());
+        }
         let counted = stream.counted(Some(start + Duration::from_secs(10)));
         let beyond = counted.iter().find(|it| it.who == "several").unwrap();
         assert_eq!(beyond.times, 9800);
         let text = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(text.lines().count(), 201);
+        assert_eq!(text.lines().count(), 202);
     }
 }

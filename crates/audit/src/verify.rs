@@ -166,7 +166,12 @@ impl Check<'_> {
         if !is_chained && self.torn.is_some() {
             return Err(self.unreadable((file, line)));
         }
-        let broken = if number > expected && !is_first {
+        let broken = if is_first && self.is_noted_gone(seal) {
+            Some(BrokenChain::Missing {
+                first: self.noted.map_or(1, |(noted, _)| noted),
+                last: number - 1,
+            })
+        } else if number > expected && !is_first {
             Some(BrokenChain::Missing {
                 first: expected,
                 last: number - 1,
@@ -194,6 +199,13 @@ impl Check<'_> {
     fn is_other_than_noted(&self, number: u64, hash: LineHash) -> bool {
         self.noted
             .is_some_and(|(noted, was)| noted == number && was != hash.to_string())
+    }
+
+    /// Whether the noted line was before the first one that is there, which does not follow it.
+    fn is_noted_gone(&self, first: &Seal) -> bool {
+        self.noted.is_some_and(|(noted, was)| {
+            noted < first.number && (noted + 1 != first.number || was != first.after)
+        })
     }
 
     /// The error about the incomplete line, if there is one, or about this place.
@@ -292,6 +304,29 @@ mod tests {
         fs::remove_file(&files[1]).unwrap();
         let error = broken(&path);
         assert!(error.contains(":1: lines 4 to 6 are missing"), "{error}");
+    }
+
+    #[test]
+    fn a_noted_line_before_the_first_that_is_there_is_missing_unless_that_follows_it() {
+        let (_folder, path) = log(10);
+        let files = verify(&path, None).unwrap().files;
+        let (_short, same) = log(3);
+        let third = verify(&same, None).unwrap().hash.to_string();
+        fs::remove_file(&files[0]).unwrap();
+        // Line 4 has the hash of the third line of this log, not of another with the same acts.
+        let error = verify(&path, Some((3, &third))).unwrap_err().to_string();
+        assert!(error.contains("lines 3 to 3 are missing"), "{error}");
+        let text = fs::read_to_string(&files[1]).unwrap();
+        let after = text
+            .split("\"after\":\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap();
+        verify(&path, Some((3, after))).unwrap();
+        let error = verify(&path, Some((1, after))).unwrap_err().to_string();
+        assert!(error.contains("lines 1 to 3 are missing"), "{error}");
     }
 
     #[test]

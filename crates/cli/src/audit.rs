@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use jaus::endpoint::{Decided, Remote};
 use jaus::node::DecisionRecorder;
 use jaus_audit::{AuditLog, AuditSettings, Entry, ForwardError, ForwardTo, Unwritable};
+use jaus_limits::quota_address;
 use serde::Deserialize;
 
 use super::failure::Failure;
@@ -114,7 +115,7 @@ impl DecisionRecorder for PlainLinks {
         let entry = Entry::of("plain link", &decided.decision).times(decided.times);
         self.0.write(match decided.client {
             // With its port, each attempt of a flood would be an entry of its own.
-            Remote::Socket(address) => entry.address(address.ip()),
+            Remote::Socket(address) => entry.address(quota_address(address.ip())),
             other => entry.address(other),
         });
     }

@@ -80,6 +80,8 @@ fn a_name_that_no_definition_has_gives_no_right_and_takes_none_silently() {
         refused("command except=SetLamp", wrench),
         Err(Refusal::UnknownName)
     );
+    let stop = b"\x06\0\x01\0";
+    assert_eq!(refused("except=SetLamp", stop), Ok(()), "a stop passes");
     assert_eq!(refused("also=SetLamp", b"\x03\xD1"), Err(Refusal::Unknown));
     let rules: Rules = "command only=SetLamp".parse().unwrap();
     assert_eq!(rules.verify(&with_lamp()), Ok(()));

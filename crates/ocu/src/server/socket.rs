@@ -433,7 +433,6 @@ impl Reader<'_> {
         })
     }
 
-    /// Why the visitor may not do what needs this role.
     /// The callback that reports the result of a request to the page. Without an id, only refusals
     /// are reported, at a limited rate.
     fn reply(&mut self, id: Option<u64>) -> Reply {

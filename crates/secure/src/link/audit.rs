@@ -39,5 +39,5 @@ pub(super) fn entry(record: Record) -> Entry {
 pub(super) fn loss(count: u64) -> Entry {
     let mut entry = Entry::new("jaus", "audit", Outcome::Failed);
     entry.times = count;
-    entry.because("refusals not recorded, because too many came at once")
+    entry.because("not recorded, because too much came at once")
 }

@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 
 use jaus::address::JausId;
-use jaus::rights::Decision;
+use jaus::rights::{Decision, Weight};
 use quinn_proto::ConnectionError;
 
 use crate::authority::Rejection;
@@ -48,12 +48,12 @@ pub enum Act {
 }
 
 impl Act {
-    /// Whether something was refused.
-    pub(super) const fn is_refusal(&self) -> bool {
+    /// How much it matters.
+    pub(super) const fn weight(&self) -> Weight {
         match self {
-            Self::HandshakeFailed(_) | Self::DisputedId { .. } => true,
-            Self::Decided(decision) => decision.is_refusal(),
-            Self::Connected | Self::Disconnected { .. } => false,
+            Self::HandshakeFailed(_) | Self::DisputedId { .. } => Weight::Refusal,
+            Self::Decided(decision) => decision.weight(),
+            Self::Connected | Self::Disconnected { .. } => Weight::Evidence,
         }
     }
 }

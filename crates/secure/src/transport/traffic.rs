@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::{Decision, Unaccepted, denial};
+use jaus::rights::{Decision, Unaccepted, Weight, denial};
 use jaus::wire::{DataControl, Frame, Priority, judp};
 use quinn_proto::StreamId;
 
@@ -250,21 +250,21 @@ impl Transport {
         });
     }
 
-    /// Adds a record. If too many wait, refusals are counted instead, so that a flood of them does
-    /// not displace what was done.
+    /// Adds a record. If too many wait, it is counted instead: a flood of refusals, or of what everybody
+    /// may do, leaves room for what needs a right, and no record displaces another.
     pub(super) fn push_record(&mut self, record: Record) {
-        if self.records.len() >= MOST_RECORDS && record.act.is_refusal() {
+        let most = match record.act.weight() {
+            Weight::Refusal | Weight::Free => MOST_RECORDS,
+            Weight::Evidence => 2 * MOST_RECORDS,
+        };
+        if self.records.len() < most {
+            self.records.push_back(record);
+        } else {
             self.counters.add(Counter::RecordsLost);
-            return;
         }
-        if self.records.len() >= 2 * MOST_RECORDS {
-            self.records.pop_front();
-            self.counters.add(Counter::RecordsLost);
-        }
-        self.records.push_back(record);
     }
 
-    /// The next record for an audit log. If 256 wait, further refusals are only counted.
+    /// The next record for an audit log. If 256 wait, refusals and what everybody may do are only counted.
     pub fn poll_record(&mut self) -> Option<Record> {
         self.records.pop_front()
     }
