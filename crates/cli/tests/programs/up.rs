@@ -325,7 +325,7 @@ fn a_part_runs_where_and_with_what_the_file_says_and_drives_no_terminal() {
         folder.0.display()
     );
     assert!(output.contains(&place), "{output}");
-    assert!(output.contains("part | \u{FFFD}[2Jx\n"), "{output:?}");
+    assert!(output.contains("part | \\u{1b}[2Jx\n"), "{output:?}");
     assert!(
         output.lines().all(|line| line.len() < 4200),
         "a long line is broken"

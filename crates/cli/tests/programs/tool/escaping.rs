@@ -16,7 +16,7 @@ use crate::support::run;
 const NAME: &str =
     "\x1b]0;title\x07\x1b[2J\x1b[8m\r\nforged line \u{202e}\u{9b}2J\u{200b}\u{2028}\u{7f}";
 const URN: &str = "urn:\x1b[2J\nforged:\rforged line\u{202e}\u{200b}";
-const ALL_SERVICES: &str = r#"{"NodeList":[{"NodeID":255,"ComponentList":[{"ComponentID":255}]}]}"#;
+const ALL_SERVICES: &str = r#"[{"NodeRec":{"NodeID":255},"ComponentList":[{"ComponentID":255}]}]"#;
 
 /// A service that only has a name.
 struct Named;
