@@ -34,6 +34,8 @@ pub struct Settings {
     pub prefix: Prefix,
     /// The ids that may come from the zenoh side, and their rights.
     pub accept: Acceptance,
+    /// What messages need, for `accept`; of the catalogue by default.
+    pub table: Table,
     /// Whether `accept` may let ids do more than watch although the links of the zenoh network do not prove
     /// who is there.
     pub trusts_network: bool,
@@ -79,6 +81,7 @@ pub struct Exchange {
     id: BridgeId,
     prefix: Prefix,
     accept: Acceptance,
+    table: Table,
     offer: Vec<JausId>,
     remotes: Remotes,
     /// The components of this side.
@@ -106,6 +109,7 @@ impl Exchange {
             id,
             prefix: settings.prefix,
             accept: settings.accept,
+            table: settings.table,
             offer: settings.offer,
             remotes: Remotes::default(),
             locals: BTreeMap::new(),
@@ -208,19 +212,32 @@ impl Exchange {
         if self.is_local(now, source) {
             return Err(Counter::OwnId);
         }
-        let checked = self.accept.check(&frame, &Table::default());
-        if checked == Err(Unaccepted::Source) {
+        let admitted = self.accept.admit(&frame, &self.table);
+        if admitted == Err(Unaccepted::Source) {
             return Err(Counter::NotAccepted);
         }
         let session = self.remotes.hear(from, source);
         let session = session.inspect_err(|_| self.note_intruder(now, key, source, from))?;
-        if let Err(Unaccepted::Rule(refusal)) = checked {
-            self.refuse(now, from, &frame, refusal);
-            return Err(Counter::RuleForbids);
-        }
-        match self.arrivals.push(session, payload.clone()) {
-            true => self.counters.add(Counter::Received),
-            false => return Err(Counter::InboxFull),
+        let admitted = match admitted {
+            Ok(admitted) => admitted,
+            Err(Unaccepted::Rule(refusal)) => {
+                self.refuse(now, from, &frame, refusal);
+                return Err(Counter::RuleForbids);
+            }
+            Err(Unaccepted::Source) => return Err(Counter::NotAccepted),
+        };
+        let datagrams = match admitted.copies(&frame) {
+            Some(copies) => copies
+                .iter()
+                .filter_map(|it| judp::encode(it).ok())
+                .collect(),
+            None => vec![payload.clone()],
+        };
+        for datagram in datagrams {
+            match self.arrivals.push(session, datagram) {
+                true => self.counters.add(Counter::Received),
+                false => return Err(Counter::InboxFull),
+            }
         }
         Ok(())
     }

@@ -7,7 +7,8 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::Config;
-use jaus::rights::{Acceptance, Grant, Table};
+use jaus::rights::{Acceptance, Grant};
+use jaus_cli::permissions::table_with;
 use jaus_cli::{Failure, Ready, launch};
 use jaus_vehicle::parts::Part;
 use jaus_zenoh::key::Prefix;
@@ -36,10 +37,15 @@ struct Flags {
     /// Accept these ids from the zenoh side, with these rights, such as "60 control=127" or
     /// "60.1.1 command" (repeatable; the first that matches counts) [default: all ids, which may watch]
     ///
-    /// The rights are observe, command, control=AUTHORITY, clear-emergency, configure, with=IDS,
-    /// only=NAMES and except=NAMES, as in the file of trusted keys.
+    /// The rights are observe, command, control=AUTHORITY, clear-emergency, clear-emergency=any, configure,
+    /// with=IDS, only=NAMES, except=NAMES and also=CODES, as in the file of trusted keys.
     #[arg(long, value_name = "IDS RIGHTS")]
     accept: Vec<Grant>,
+
+    /// Decide on messages of one's own, too, by what the JSIDL file or directory states of them
+    /// (repeatable)
+    #[arg(long, value_name = "PATH")]
+    accept_jsidl: Vec<PathBuf>,
 
     /// Let --accept give more rights than to watch although the links of zenoh are not all TLS with client
     /// certificates: whoever reaches the network can then act as these ids
@@ -86,9 +92,10 @@ impl Ready for Flags {
     fn part(self) -> Result<impl Part, Failure> {
         let mut settings = Settings::default();
         settings.prefix = self.prefix;
+        settings.table = table_with(&self.accept_jsidl)?;
         if !self.accept.is_empty() {
             settings.accept = Acceptance::new(self.accept);
-            let names = settings.accept.verify(&Table::default());
+            let names = settings.accept.verify(&settings.table);
             names.map_err(Failure::of)?;
         }
         settings.trusts_network = self.trust_network;

@@ -103,7 +103,8 @@ impl Rights {
     fn check(&self, code: u16, fields: &[u8], to: JausId) -> Result<(), Refusal> {
         let message = [code.to_le_bytes().as_slice(), fields].concat();
         let frame = Frame::new(self.from, to, message.into());
-        self.rules.check(&frame, &self.table)
+        // A stop goes to the components one by one: to those that may be reached.
+        self.rules.admit(&frame, &self.table).map(drop)
     }
 }
 

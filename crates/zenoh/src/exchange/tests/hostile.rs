@@ -76,6 +76,22 @@ fn with_the_right_commands_and_control_pass_up_to_its_authority() {
 }
 
 #[test]
+fn a_stop_to_a_group_reaches_those_that_its_sender_may_reach_and_no_others() {
+    let now = Instant::now();
+    let mut vehicle = bridge(THERE, &["60 control=100 with=101.255.255"]);
+    announce_by(HERE, now, &mut vehicle, OPERATOR);
+    let (key, octets) = sample(&frame(OPERATOR, JausId::EVERYONE, SET_EMERGENCY), HERE);
+    vehicle.handle_sample(now, &key, &octets);
+    let arrived = arrivals(&mut vehicle);
+    let [Arrival::Datagram { octets, .. }] = &*arrived else {
+        panic!("{arrived:?}");
+    };
+    let stop = only_frame(octets).unwrap();
+    assert_eq!(stop.destination, JausId::new(101, 255, 255));
+    assert_eq!(stop.payload, SET_EMERGENCY);
+}
+
+#[test]
 fn an_id_that_is_not_accepted_neither_sends_nor_appears() {
     let now = Instant::now();
     let mut vehicle = bridge(THERE, &["60"]);
