@@ -48,7 +48,7 @@ struct Flags {
     accept_jsidl: Vec<PathBuf>,
 
     /// Let --accept give more rights than to watch although the links of zenoh are not all TLS with client
-    /// certificates: whoever reaches the network can then act as these ids
+    /// certificates: anyone who reaches the network can then act as these ids
     #[arg(long)]
     trust_network: bool,
 

@@ -7,7 +7,7 @@ use jaus_limits::{Bucket, Rate};
 
 /// Matters that were logged.
 ///
-/// Whoever is on the zenoh network may invent any number of them, so they have a rate, and the table has a
+/// Anyone on the zenoh network may invent any number of them, so they have a rate, and the table has a
 /// bound. What exceeds the rate is logged later, if it happens again then.
 #[derive(Debug)]
 pub(crate) struct Notices<M> {

@@ -45,7 +45,7 @@ struct Publisher {
     heard: Instant,
     /// Its commands, the last ones.
     run: Option<Run>,
-    /// Commands with its gid whose numbers are far from those. Somebody else uses its gid, or its numbers have
+    /// Commands with its gid whose numbers are far from those. Another node uses its gid, or its numbers have
     /// jumped: nobody can tell, so that none of both keeps the other one out.
     other_run: Option<Run>,
     /// The last command that moves, after which the publisher has neither stopped nor paused.

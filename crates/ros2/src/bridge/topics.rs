@@ -279,7 +279,7 @@ impl Incoming {
         }
     }
 
-    /// A message counts only if its publisher has declared its token: whoever invents a gid speaks for nobody.
+    /// A message counts only if its publisher has declared its token: an invented gid speaks for nobody.
     fn input(&self, received: &Received, read: impl Fn(&Received, Gid) -> Option<Input>) -> Input {
         let gid = received.attachment.gid;
         let Some(publisher) = self.ros.publisher(&self.topic, gid) else {

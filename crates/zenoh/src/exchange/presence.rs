@@ -58,7 +58,7 @@ impl Exchange {
             self.arrivals.close(session);
         }
         if was_owner {
-            // Whoever has claimed it meanwhile may be an intruder of another owner now.
+            // The one who has claimed it meanwhile may be another owner's intruder now.
             self.intruders.end(|(id, _)| *id == component);
             self.owners.end(|(id, _)| *id == component);
         } else {

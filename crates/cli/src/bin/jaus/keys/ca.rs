@@ -77,7 +77,7 @@ struct New {
     #[arg(long, value_name = "FILE", conflicts_with = "unencrypted")]
     passphrase_file: Option<PathBuf>,
 
-    /// Leave the key unencrypted: whoever copies the file can issue certificates
+    /// Leave the key unencrypted: anyone who copies the file can issue certificates
     #[arg(long)]
     unencrypted: bool,
 

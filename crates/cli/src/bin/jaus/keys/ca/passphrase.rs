@@ -69,7 +69,7 @@ pub(super) struct Change {
     #[arg(long, value_name = "FILE", conflicts_with = "unencrypted")]
     new_passphrase_file: Option<PathBuf>,
 
-    /// Leave the key unencrypted: whoever copies the file can issue certificates
+    /// Leave the key unencrypted: anyone who copies the file can issue certificates
     #[arg(long)]
     unencrypted: bool,
 
