@@ -126,8 +126,8 @@ export class Element extends Target {
   }
 
   setAttribute(name, value) {
+    if (name === "class" && this.className !== String(value)) this.#document.structure++;
     this.#attributes.set(name, String(value));
-    if (name === "class") this.#document.structure++;
     if (name === "disabled") this.disabled = true;
     this.#document.handleMutation(this, name);
   }
@@ -212,14 +212,22 @@ export class Element extends Target {
   }
 
   matches(selectors) {
-    return selectors.split(",").some((selector) => isMatch(this, selector.trim()));
+    return testOf(selectors)(this);
   }
 
   querySelectorAll(selectors) {
     const scope = ":scope > ";
     if (selectors.startsWith(scope)) return this.children.filter((child) => child.matches(selectors.slice(scope.length)));
-    const below = this.children.flatMap((child) => [child, ...child.querySelectorAll("*")]);
-    return selectors === "*" ? below : below.filter((element) => element.matches(selectors));
+    const found = [];
+    this.#collect(selectors, found);
+    return found;
+  }
+
+  #collect(selectors, found) {
+    for (const child of this.children) {
+      if (child.matches(selectors)) found.push(child);
+      child.#collect(selectors, found);
+    }
   }
 
   querySelector(selectors) {
@@ -266,13 +274,16 @@ export class Element extends Target {
 
 const dataName = (name) => `data-${String(name).replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`)}`;
 
-/** The tests of each selector that was used before. */
+/** The test of each list of selectors that was used before. */
 const tests = new Map();
 
-/** Matches a compound selector of tag, class, id and attribute, without combinators. */
-function isMatch(element, selector) {
-  if (!tests.has(selector)) tests.set(selector, compile(selector));
-  return tests.get(selector).every((test) => test(element));
+/** Tests an element by compound selectors of tag, class, id and attribute, without combinators. */
+function testOf(selectors) {
+  if (!tests.has(selectors)) {
+    const all = selectors.split(",").map((selector) => compile(selector.trim()));
+    tests.set(selectors, (element) => all.some((parts) => parts.every((part) => part(element))));
+  }
+  return tests.get(selectors);
 }
 
 function compile(selector) {
@@ -280,7 +291,7 @@ function compile(selector) {
   if (parts.join("") !== selector) throw new Error(`a selector that this document does not know: ${selector}`);
   return parts.map((part) => {
     const name = part.slice(1);
-    if (part[0] === ".") return (element) => element.classList.contains(name);
+    if (part[0] === ".") return (element) => ` ${element.className} `.includes(` ${name} `);
     if (part[0] === "#") return (element) => element.id === name;
     if (part[0] !== "[") return (element) => element.tag === part;
     const [attribute, value] = part.slice(1, -1).split("=");
