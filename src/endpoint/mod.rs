@@ -49,6 +49,7 @@ mod peers;
 mod rate;
 mod receive;
 mod recent;
+mod restricted;
 mod send;
 mod share;
 mod sink;
@@ -80,6 +81,7 @@ pub use send::SendError;
 pub use sink::{Ingress, Sink};
 
 use crate::address::JausId;
+use crate::rights::Rules;
 use crate::wire::Priority;
 use acknowledge::Calls;
 use decided::Decisions;
@@ -97,6 +99,8 @@ pub struct Endpoint {
     config: Arc<Config>,
     /// The attached components.
     components: BTreeSet<JausId>,
+    /// The rights of those that may not send everything.
+    restricted: BTreeMap<JausId, Rules>,
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
@@ -134,6 +138,7 @@ impl Endpoint {
         let longest = config.retransmission_window;
         Self {
             components: BTreeSet::new(),
+            restricted: BTreeMap::new(),
             peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.limits),
@@ -180,6 +185,7 @@ impl Endpoint {
     /// Detaches a local component and gives up its unacknowledged messages.
     pub fn detach(&mut self, id: JausId) {
         self.components.remove(&id);
+        self.restricted.remove(&id);
         let given_up = self.deliveries.forget_source(id);
         self.counters.add_many(Counter::MessagesGivenUp, given_up);
         self.conflicts.remove(&id);

@@ -9,6 +9,7 @@ use super::egress::{FragmentedSend, Hop};
 use super::large::{Cut, Cutting};
 use super::{Counter, Endpoint, Event, MessageHandle, Outgoing, Pacing, Path, Received, Sink, To};
 use crate::address::JausId;
+use crate::rights::{Admitted, Refusal};
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, as5669a,
 };
@@ -43,6 +44,9 @@ pub enum SendError {
         "{0} is not a single component, and only messages to one component can be acknowledged"
     )]
     ManyAcknowledgements(JausId),
+    /// The sender may not send it, as [`Endpoint::restrict`] says.
+    #[error("this component may not send it: {0}")]
+    NotAllowed(Refusal),
     /// A local broadcast to another subsystem.
     #[error("a local broadcast stays in the sender's subsystem and cannot go to {0}")]
     OutOfScope(JausId),
@@ -107,6 +111,9 @@ impl Endpoint {
         sink: &mut dyn Sink,
     ) -> Result<MessageHandle, SendError> {
         let scope = self.check(&message)?;
+        if let Admitted::Narrowed(ids) = self.admit_restricted(now, &message, sink)? {
+            return self.send_to_each(now, &message, ids, sink);
+        }
         let handle = self.deliveries.next_handle();
         let (destination, length) = (message.destination, message.payload.len());
         if self.components.contains(&message.destination) {

@@ -36,12 +36,13 @@ pub(super) enum Warning {
     PinnedElsewhere,
     BoundElsewhere,
     NotGranted,
+    OwnNotGranted,
     Unverified,
 }
 
 /// When each warning was last logged.
 #[derive(Debug, Default)]
-pub(super) struct Warnings([Option<Instant>; 8]);
+pub(super) struct Warnings([Option<Instant>; 9]);
 
 impl Warnings {
     /// Whether a warning may be logged again.

@@ -59,7 +59,9 @@ use std::sync::Arc;
 
 pub use self::clock::{now, sleep_until, time_of_day};
 pub use self::components::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Delivery, PeerAddress, Tcp, units};
+pub use self::config::{
+    Config, ConfigError, Delivery, LocalUser, LocalUserError, PeerAddress, Tcp, units,
+};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 use self::events::Recorder;
 pub use self::events::{DecisionRecorder, EventStream};

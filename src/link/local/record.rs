@@ -179,6 +179,9 @@ pub enum Reason {
     /// The node is about to stop.
     #[deku(id = 5)]
     Stopping,
+    /// Programs of this user may not attach, or not with this id.
+    #[deku(id = 6)]
+    User,
     /// A reason of a later version.
     #[deku(id_pat = "_")]
     Other(u8),

@@ -41,12 +41,21 @@ impl fmt::Display for Process {
     }
 }
 
-/// Both halves of a stream, and the process id of the other end if the operating system reports it.
+/// Both halves of a stream, and who is at the other end.
 #[derive(Debug)]
 pub(crate) struct Stream {
     pub(crate) read: ReadHalf,
     pub(crate) write: WriteHalf,
+    pub(crate) peer: Credentials,
+}
+
+/// What the operating system reports of the other end; of a TCP connection nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Credentials {
+    /// Its process.
     pub(crate) pid: Option<u32>,
+    /// Its user.
+    pub(crate) uid: Option<u32>,
 }
 
 #[cfg(unix)]
@@ -65,7 +74,7 @@ mod on_unix {
     use tokio::io::Interest;
     use tokio::io::unix::AsyncFd;
 
-    use super::{Assembler, Stream};
+    use super::{Assembler, Credentials, Stream};
     use crate::link::watch::watch;
 
     /// The reading half of a stream.
@@ -81,12 +90,12 @@ mod on_unix {
     }
 
     impl Stream {
-        pub(super) fn new(socket: impl Into<Socket>, pid: Option<u32>) -> io::Result<Self> {
+        pub(super) fn new(socket: impl Into<Socket>, peer: Credentials) -> io::Result<Self> {
             let socket = Arc::new(socket.into());
             Ok(Self {
                 read: ReadHalf(watch(socket.clone(), Interest::READABLE)?),
                 write: WriteHalf { socket, full: None },
-                pid,
+                peer,
             })
         }
     }
@@ -159,7 +168,7 @@ mod elsewhere {
     use tokio::io::AsyncReadExt;
     use tokio::net::{TcpStream, tcp};
 
-    use super::{Assembler, Stream};
+    use super::{Assembler, Credentials, Stream};
 
     #[derive(Debug)]
     pub(crate) struct ReadHalf(tcp::OwnedReadHalf);
@@ -168,10 +177,10 @@ mod elsewhere {
     pub(crate) struct WriteHalf(tcp::OwnedWriteHalf);
 
     impl Stream {
-        pub(super) fn new(stream: std::net::TcpStream, pid: Option<u32>) -> io::Result<Self> {
+        pub(super) fn new(stream: std::net::TcpStream, peer: Credentials) -> io::Result<Self> {
             let (read, write) = TcpStream::from_std(stream)?.into_split();
             let (read, write) = (ReadHalf(read), WriteHalf(write));
-            Ok(Self { read, write, pid })
+            Ok(Self { read, write, peer })
         }
     }
 
@@ -204,15 +213,19 @@ mod elsewhere {
 pub(super) fn tcp_stream(stream: TcpStream) -> io::Result<Stream> {
     // Records are collected before they are written, so waiting for more would only delay them.
     let _ = stream.set_nodelay(true);
-    Stream::new(stream.into_std()?, None)
+    Stream::new(stream.into_std()?, Credentials::default())
 }
 
 /// Both halves of a Unix stream, and the user id of the other end.
 #[cfg(unix)]
 pub(super) fn unix_stream(stream: UnixStream) -> io::Result<(Stream, u32)> {
     let peer = stream.peer_cred()?;
-    let stream = Stream::new(stream.into_std()?, pid_of(&peer))?;
-    Ok((stream, peer.uid()))
+    let uid = peer.uid();
+    let credentials = Credentials {
+        pid: pid_of(&peer),
+        uid: Some(uid),
+    };
+    Ok((Stream::new(stream.into_std()?, credentials)?, uid))
 }
 
 /// The process id of the other end, from its credentials.

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use crate::address::ParseIdError;
 use crate::link::InvalidGroup;
-use crate::rights::GrantError;
+use crate::rights::{GrantError, RuleError};
 
 /// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,6 +30,9 @@ pub enum ConfigError {
     /// The words of a grant are wrong.
     #[error("access.grants: {0}")]
     Grant(#[from] GrantError),
+    /// The rights of a user are wrong.
+    #[error("local_users: `{0}`: {1}")]
+    LocalUser(String, RuleError),
     /// Two lines on one device.
     #[error("the serial port {0} appears twice: remove one entry")]
     SerialTwice(String),

@@ -15,6 +15,7 @@
 //! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
 //! local = "default"                    # or a path, or "off" (the default)
 //! local_group = true                   # also for processes of this process's group
+//! local_users = ["camera observe"]     # what the processes of each user may do
 //! junior = "/tmp"                      # through Junior's node manager in the place of UDP (Unix)
 //! max_message = "4MiB"                 # sizes: octets, or with a unit (see `units`)
 //!
@@ -43,6 +44,7 @@
 mod delivery;
 mod error;
 mod limits;
+mod local_user;
 mod peer;
 mod tcp;
 #[cfg(test)]
@@ -56,6 +58,7 @@ use std::path::PathBuf;
 pub use self::delivery::Delivery;
 pub use self::error::ConfigError;
 use self::error::{in_range, not_zero};
+pub use self::local_user::{LocalUser, LocalUserError};
 pub use self::peer::PeerAddress;
 pub use self::tcp::Tcp;
 use super::mailbox::MailboxLimits;
@@ -127,6 +130,11 @@ pub struct Config {
     /// Whether processes of this process's group may attach there too, so that the parts of a vehicle
     /// run as users of their own. Concerns sockets of the file system.
     pub local_group: bool,
+    /// What the programs of each user may do that attach there, in the words of
+    /// [`rights`](crate::rights): `["jaus-planner control=255", "jaus-camera 101.1.40 observe"]`, for any
+    /// user `*`. The first entry for a user counts, and a user without one may not attach. Without entries,
+    /// and for root and the user of this process, there are no limits.
+    pub local_users: Vec<LocalUser>,
     /// The folder of Junior's sockets, `/tmp` in a default installation. If set, the components are
     /// clients of the node manager of a Junior on this host, and the node opens no UDP itself:
     /// Junior determines interfaces, port, group and peers.
@@ -179,6 +187,7 @@ impl Config {
             mailbox: MailboxLimits::default(),
             local: Local::Off,
             local_group: false,
+            local_users: Vec::new(),
             #[cfg(unix)]
             junior: None,
             tcp: Tcp::default(),
@@ -309,6 +318,10 @@ impl Config {
         limits::validate(&self.routing, &self.limits)?;
         self.delivery.validate()?;
         self.access.verify_grants()?;
+        for user in &self.local_users {
+            let verified = user.verify(&self.access.table);
+            verified.map_err(|why| ConfigError::LocalUser(user.to_string(), why))?;
+        }
         Ok(self.udp().validate()?)
     }
 

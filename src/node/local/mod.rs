@@ -9,6 +9,7 @@
 )]
 
 mod session;
+mod users;
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -27,7 +28,7 @@ use crate::endpoint::AttachError;
 use crate::link::local::record::{
     Head, LONGEST_HEAD, LONGEST_HELLO, Reason, Record, RecordError, VERSION,
 };
-use crate::link::local::{Error, Listener, Process, Reader, Stream, Writer};
+use crate::link::local::{Credentials, Error, Listener, Process, Reader, Stream, Writer};
 
 /// Limit of connections whose component is not attached yet.
 const UNATTACHED: usize = 32;
@@ -78,7 +79,8 @@ pub(super) async fn serve(
 /// Attaches the component at the other end of a connection, or sends it the reason for a
 /// refusal.
 async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader)> {
-    let Stream { read, write, pid } = stream;
+    let Stream { read, write, peer } = stream;
+    let Credentials { pid, uid } = peer;
     let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
     let hello = async {
         let record = reader.read().await?;
@@ -99,7 +101,7 @@ async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader
         }
     };
     let process = Process { pid, name };
-    match admit(shared, version, id, &process).await {
+    match admit(shared, (version, id), uid, &process).await {
         Ok((id, mailbox)) => {
             let max_message = u32::try_from(shared.config.max_message).unwrap_or(u32::MAX);
             reader.set_limit(max_message as usize + LONGEST_HEAD);
@@ -127,18 +129,25 @@ async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader
 
 async fn admit(
     shared: &Shared,
-    version: u8,
-    wanted: JausId,
+    (version, wanted): (u8, JausId),
+    uid: Option<u32>,
     process: &Process,
 ) -> Result<(JausId, Arc<Mailbox>), Refusal> {
     let id = full_id(&shared.config, version, wanted)?;
+    let rules = users::rights_of(&shared.config.local_users, uid, id).await?;
     let deadline = tokio::time::Instant::now() + OVERLAP;
     loop {
         if shared.lock().stop_at.is_some() {
             return Err((Reason::Stopping, "the node is stopping".to_owned()));
         }
         let error = match shared.attach(id, Some(process.clone())) {
-            Ok(mailbox) => return Ok((id, mailbox)),
+            Ok(mailbox) => {
+                // Nothing of it is read before this.
+                if let Some(rules) = rules {
+                    shared.lock().endpoint.restrict(id, rules);
+                }
+                return Ok((id, mailbox));
+            }
             Err(error) => error,
         };
         let holder = shared.lock().components.process(id).cloned();
