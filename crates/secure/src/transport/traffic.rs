@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::{Decision, Unaccepted, Weight, denial};
+use jaus::rights::{Decision, Unaccepted, denial};
 use jaus::wire::{DataControl, Frame, Priority, judp};
 use quinn_proto::StreamId;
 
@@ -23,8 +23,6 @@ const NOTICE: u8 = 0xFE;
 const LONGEST_NOTICE: usize = 300;
 /// The shortest interval between notices of a session.
 const NOTICE_PAUSE: Duration = Duration::from_secs(1);
-/// Records that may wait for their reader.
-const MOST_RECORDS: usize = 256;
 
 impl Transport {
     /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
@@ -250,22 +248,16 @@ impl Transport {
         });
     }
 
-    /// Adds a record. If too many wait, it is counted instead: a flood of refusals, or of what everybody
-    /// may do, leaves room for what needs a right, and no record displaces another.
+    /// Adds a record.
     pub(super) fn push_record(&mut self, record: Record) {
-        let most = match record.act.weight() {
-            Weight::Refusal | Weight::Free => MOST_RECORDS,
-            Weight::Evidence => 2 * MOST_RECORDS,
-        };
-        if self.records.len() < most {
-            self.records.push_back(record);
-        } else {
+        if !self.records.push(record) {
             self.counters.add(Counter::RecordsLost);
         }
     }
 
-    /// The next record for an audit log. If 256 wait, refusals and what everybody may do are only counted.
-    pub fn poll_record(&mut self) -> Option<Record> {
-        self.records.pop_front()
+    /// The next record for an audit log, and how often it came. Those for which the queue has no room are
+    /// counted as [`Counter::RecordsLost`].
+    pub fn poll_record(&mut self) -> Option<(Record, u64)> {
+        self.records.pop()
     }
 }
