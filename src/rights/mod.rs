@@ -64,7 +64,7 @@ mod words;
 pub(crate) use accept::admit as admit_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
 pub use decision::{Decision, Verdict, Weight, check_unrecorded, denial};
-pub use queue::{Decided, DecisionQueue};
+pub use queue::{Decided, DecisionQueue, Weighted, WeightedQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 pub use words::RuleError;

@@ -194,7 +194,7 @@ impl SecureLink {
     fn write_records(&mut self) {
         let Some(log) = &self.audit else { return };
         let records = std::iter::from_fn(|| self.transport.poll_record());
-        records.for_each(|record| log.write(audit::entry(record)));
+        records.for_each(|(record, times)| log.write(audit::entry(record).times(times)));
         let lost = self.transport.counters().get(Counter::RecordsLost);
         if lost > self.records_lost {
             log.write(audit::loss(lost - self.records_lost));

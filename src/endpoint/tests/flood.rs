@@ -269,7 +269,7 @@ fn a_flood_of_refusals_does_not_displace_what_was_done() {
         decided.iter().any(|it| it.0.starts_with("SetEmergency")),
         "{decided:?}"
     );
-    assert_eq!(decided.len(), 129);
+    assert_eq!(decided.len(), 257);
     assert!(rig.count(Counter::DecisionsLost) > 0);
 }
 

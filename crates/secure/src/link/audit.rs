@@ -37,7 +37,6 @@ pub(super) fn entry(record: Record) -> Entry {
 
 /// The entry about records that were not kept.
 pub(super) fn loss(count: u64) -> Entry {
-    let mut entry = Entry::new("jaus", "audit", Outcome::Failed);
-    entry.times = count;
+    let entry = Entry::new("jaus", "audit", Outcome::Failed).times(count);
     entry.because("not recorded, because too much came at once")
 }

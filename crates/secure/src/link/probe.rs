@@ -50,7 +50,7 @@ impl SecureLink {
         while self.poll_receive(cx, now).is_ready() {}
         let _ = self.poll_flush(cx, now);
         let mut has_event = false;
-        while let Some(record) = self.transport.poll_record() {
+        while let Some((record, _)) = self.transport.poll_record() {
             has_event = true;
             if let (Act::HandshakeFailed(fault), Some(index)) = (
                 record.act,

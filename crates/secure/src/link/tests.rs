@@ -157,12 +157,12 @@ async fn a_node_that_is_shut_down_tells_its_peers() {
     let closed = std::future::poll_fn(|cx| at_client.poll_receive(cx, node::now()));
     let closed = tokio::time::timeout(LIMIT, closed).await.unwrap();
     assert!(matches!(closed, Arrival::Closed(_)), "{closed:?}");
-    let reason = std::iter::from_fn(|| at_client.transport.poll_record()).find_map(|record| {
-        match record.act {
+    let reason = std::iter::from_fn(|| at_client.transport.poll_record()).find_map(
+        |(record, _)| match record.act {
             Act::Disconnected { reason } => Some(reason),
             _ => None,
-        }
-    });
+        },
+    );
     assert!(reason.unwrap().contains("the node stops"));
 }
 

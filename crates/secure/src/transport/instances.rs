@@ -5,8 +5,8 @@
 //! program cannot take its place, even with the same key.
 //!
 //! A JAUS id belongs to the instance that has used it last, while that one is alive: the other's
-//! messages from this id are refused, and the owner of the id is sent a ping. If it does not answer,
-//! because it was killed or restarted, its session ends and the id is free.
+//! messages from this id are refused, but for a stop, and the owner of the id is sent a ping. If it does
+//! not answer, because it was killed or restarted, its session ends and the id is free.
 //!
 //! Peers before this version send no hello. After [`PATIENCE`] all programs of such a key count as
 //! one: the newer session replaces the older.
@@ -17,11 +17,10 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
-use jaus::rights::Unaccepted;
-use jaus::wire::Frame;
+use jaus::rights::{Permission, Table};
+use jaus::wire::{DataControl, Frame};
 
 use super::record::Act;
-use super::screen;
 use super::session::Session;
 use super::{Counter, Transport, WARNING_PAUSE, code};
 use crate::key::{self, PublicKey};
@@ -77,7 +76,7 @@ impl Instance {
 pub(super) struct UsedIds(BTreeMap<JausId, Instant>);
 
 impl UsedIds {
-    fn note(&mut self, now: Instant, id: JausId) {
+    pub(super) fn note(&mut self, now: Instant, id: JausId) {
         if self.0.len() >= MOST_IDS && !self.0.contains_key(&id) {
             self.0.retain(|_, last| now < *last + LEASE);
             if self.0.len() >= MOST_IDS {
@@ -90,6 +89,13 @@ impl UsedIds {
     fn holds(&self, now: Instant, id: JausId) -> bool {
         self.0.get(&id).is_some_and(|last| now < *last + LEASE)
     }
+}
+
+/// Whether a frame does nothing but set an emergency, which everybody may.
+pub(super) fn only_stops(frame: &Frame, table: &Table) -> bool {
+    let is_whole = frame.flags.data() == DataControl::Single && !frame.is_acknowledgement();
+    let mut needs = table.needs(&frame.payload).peekable();
+    is_whole && needs.peek().is_some() && needs.all(|it| it == Permission::Emergency)
 }
 
 impl Transport {
@@ -194,43 +200,27 @@ impl Transport {
         }
     }
 
-    /// What of a datagram comes from ids that no other program with the same key uses.
-    pub(super) fn undisputed(
-        &mut self,
+    /// The other session with this key whose program uses an id.
+    pub(super) fn other_user(
+        &self,
         now: Instant,
         session: SessionId,
-        octets: &Bytes,
-    ) -> Option<Bytes> {
-        let key = self.sessions.get(&session)?.established()?.key;
-        let others = || self.with_key(key).filter(|(id, _)| *id != session);
-        let owner = |id| others().find(|(_, it)| it.used.holds(now, id));
-        let has_others = others().next().is_some();
-        let is_free = |frame: &Frame| !has_others || owner(frame.source).is_none();
-        // What is no JUDP is counted by the next check.
-        let Some(screened) = screen::screen(octets, |it| {
-            is_free(it).then_some(true).ok_or(Unaccepted::Source)
-        }) else {
-            return Some(octets.clone());
-        };
-        for (frame, decision) in &screened.frames {
-            match decision {
-                Ok(()) => self.note_use(now, session, frame.source),
-                Err(_) => self.refuse_disputed(now, session, key, frame),
-            }
-        }
-        screened.passed
-    }
-
-    fn note_use(&mut self, now: Instant, session: SessionId, id: JausId) {
-        if let Some(session) = self.sessions.get_mut(&session)
-            && session.established().is_some_and(|it| it.speaks_for(id))
-        {
-            session.used.note(now, id);
-        }
+        key: PublicKey,
+        id: JausId,
+    ) -> Option<SessionId> {
+        let mut others = self.with_key(key).filter(|(it, _)| *it != session);
+        let user = others.find(|(_, it)| it.used.holds(now, id));
+        user.map(|(session, _)| session)
     }
 
     /// Refuses a message from an id of another program, and finds out whether that one is alive.
-    fn refuse_disputed(&mut self, now: Instant, id: SessionId, key: PublicKey, frame: &Frame) {
+    pub(super) fn refuse_disputed(
+        &mut self,
+        now: Instant,
+        id: SessionId,
+        owner: SessionId,
+        frame: &Frame,
+    ) {
         let (source, destination) = (frame.source, frame.destination);
         self.counters.add(Counter::DisputedIds);
         self.record(
@@ -240,13 +230,7 @@ impl Transport {
                 destination,
             },
         );
-        let mut others = self.sessions.iter_mut();
-        let owner = others.find(|(other, it)| {
-            **other != id
-                && it.established().is_some_and(|it| it.key == key)
-                && it.used.holds(now, source)
-        });
-        let Some((_, owner)) = owner else {
+        let Some(owner) = self.sessions.get_mut(&owner) else {
             return;
         };
         if owner.asked.is_none() {

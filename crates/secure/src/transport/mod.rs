@@ -39,7 +39,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::Table;
+use jaus::rights::{Table, WeightedQueue};
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, StreamEvent,
 };
@@ -109,7 +109,7 @@ pub struct Transport {
     responses: VecDeque<(SocketAddr, Bytes)>,
     /// How many of them were sent since the connections had their turn.
     responded: usize,
-    records: VecDeque<Record>,
+    records: WeightedQueue<Record>,
     counters: Counters,
     budget: Option<Budget>,
     /// How often a session was served within the budget.
@@ -161,7 +161,7 @@ impl Transport {
             fragments: Fragments::default(),
             responses: VecDeque::new(),
             responded: 0,
-            records: VecDeque::new(),
+            records: WeightedQueue::default(),
             counters: Counters::default(),
             budget: None,
             turns: 0,

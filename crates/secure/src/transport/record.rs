@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 
 use jaus::address::JausId;
-use jaus::rights::{Decision, Weight};
+use jaus::rights::{Decision, Weight, Weighted};
 use quinn_proto::ConnectionError;
 
 use crate::authority::Rejection;
@@ -47,13 +47,12 @@ pub enum Act {
     Decided(Decision),
 }
 
-impl Act {
-    /// How much it matters.
-    pub(super) const fn weight(&self) -> Weight {
-        match self {
-            Self::HandshakeFailed(_) | Self::DisputedId { .. } => Weight::Refusal,
-            Self::Decided(decision) => decision.weight(),
-            Self::Connected | Self::Disconnected { .. } => Weight::Evidence,
+impl Weighted for Record {
+    fn weight(&self) -> Weight {
+        match &self.act {
+            Act::HandshakeFailed(_) | Act::DisputedId { .. } => Weight::Refusal,
+            Act::Decided(decision) => decision.weight(),
+            Act::Connected | Act::Disconnected { .. } => Weight::Evidence,
         }
     }
 }

@@ -2,83 +2,40 @@
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::rights::{Table, Unaccepted, check_unrecorded};
 use jaus::wire::{Frame, judp};
 
 use crate::trust::Peer;
 
-/// The octets of a datagram that pass, and each frame with the decision on it.
-#[derive(Debug)]
-pub(super) struct Screened {
-    /// The datagram as it was if all frames pass; without the others if some do; `None` if none.
-    pub(super) passed: Option<Bytes>,
-    /// Frames that pass to a part of the ids that they are for: a datagram for each.
-    pub(super) narrowed: Vec<Bytes>,
-    pub(super) frames: Vec<(Frame, Result<(), Unaccepted>)>,
-}
-
-/// Screens a datagram from a peer; `None` if it is no JUDP. What changes something is refused if it cannot
-/// be recorded.
-pub(super) fn incoming(
-    peer: &Peer,
-    (table, can_record): (&Table, bool),
-    octets: &Bytes,
-) -> Option<Screened> {
-    let mut narrowed = Vec::new();
-    let mut screened = screen(octets, |frame| {
-        if !peer.speaks_for(frame.source) {
-            return Err(Unaccepted::Source);
-        }
-        let admitted = peer.rules.admit(frame, table).map_err(Unaccepted::Rule)?;
-        if !can_record {
-            check_unrecorded(frame, table).map_err(Unaccepted::Rule)?;
-        }
-        let copies = admitted.copies(frame);
-        let passes_whole = copies.is_none();
-        narrowed.extend(copies.into_iter().flatten());
-        Ok(passes_whole)
-    })?;
-    let datagrams = narrowed.iter().filter_map(|copy| judp::encode(copy).ok());
-    screened.narrowed = datagrams.collect();
-    Some(screened)
-}
-
-/// Screens a datagram with this check, which says whether a frame passes as it is; `None` if it is no JUDP.
+/// What of a datagram passes: all octets if all frames pass, those of the others if some do, none if
+/// no frame does; `None` if it is no JUDP. The check says whether a frame passes as it is.
 pub(super) fn screen(
     octets: &Bytes,
-    mut check: impl FnMut(&Frame) -> Result<bool, Unaccepted>,
-) -> Option<Screened> {
+    mut check: impl FnMut(&Frame) -> bool,
+) -> Option<Option<Bytes>> {
     let mut following = judp::frames(octets.clone()).ok()?;
     let first = octets.len() - following.remaining();
-    let (mut begin, mut kept, mut frames) = (first, Vec::new(), Vec::new());
+    let (mut begin, mut kept, mut frames) = (first, Vec::new(), 0);
     // The endpoint stops at the same frame: the first that is malformed.
     while let Some(Ok(frame)) = following.next() {
         let end = octets.len() - following.remaining();
-        let decision = check(&frame);
-        if decision == Ok(true) {
+        if check(&frame) {
             kept.push(begin..end);
         }
-        frames.push((frame, decision.map(drop)));
+        frames += 1;
         begin = end;
     }
-    let passed = if kept.len() == frames.len() {
-        Some(octets.clone())
-    } else if kept.is_empty() {
-        None
-    } else {
-        let mut passed = BytesMut::with_capacity(octets.len());
-        passed.put_slice(&octets[..first]);
-        for range in kept {
-            passed.put_slice(&octets[range]);
-        }
-        Some(passed.freeze())
-    };
-    let narrowed = Vec::new();
-    Some(Screened {
-        passed,
-        narrowed,
-        frames,
-    })
+    if kept.len() == frames {
+        return Some(Some(octets.clone()));
+    }
+    if kept.is_empty() {
+        return Some(None);
+    }
+    let mut passed = BytesMut::with_capacity(octets.len());
+    passed.put_slice(&octets[..first]);
+    for range in kept {
+        passed.put_slice(&octets[range]);
+    }
+    Some(Some(passed.freeze()))
 }
 
 /// Whether a path between two peers is open: neither may be closed to the other.

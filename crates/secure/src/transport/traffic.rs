@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::{Decision, Unaccepted, Weight, denial};
-use jaus::wire::{DataControl, Frame, Priority, judp};
+use jaus::rights::{Admitted, Decision, Unaccepted, check_unrecorded, denial};
+use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
-use super::instances::HELLO;
+use super::instances::{HELLO, only_stops};
 use super::record::{Act, Record};
 use super::screen;
 use super::session::Session;
@@ -23,8 +23,17 @@ const NOTICE: u8 = 0xFE;
 const LONGEST_NOTICE: usize = 300;
 /// The shortest interval between notices of a session.
 const NOTICE_PAUSE: Duration = Duration::from_secs(1);
-/// Records that may wait for their reader.
-const MOST_RECORDS: usize = 256;
+
+/// Why a frame of a peer does not pass.
+#[derive(Clone, Copy, Debug)]
+enum Refused {
+    /// Its sender may not send it.
+    Unaccepted(Unaccepted),
+    /// Another program with the same key, the one of this session, uses its id.
+    Disputed(SessionId),
+    /// It continues no message of its session.
+    Stray,
+}
 
 impl Transport {
     /// Queues a JUDP datagram for a session. It is dropped if the session has ended.
@@ -61,7 +70,8 @@ impl Transport {
         let peers = || self.sessions.values().filter_map(Session::established);
         let has_limits = peers().any(|peer| !peer.rules.with.is_empty());
         let to = self.sessions.get(&session)?.established()?;
-        let screened = screen::screen(datagram, |frame| {
+        let mut stopped = 0;
+        let passed = screen::screen(datagram, |frame| {
             let is_addressed = to.ids.iter().any(|ids| ids.overlaps(frame.destination));
             let is_open = || {
                 let speaks = |peer: &&Peer| peer.speaks_for(frame.source);
@@ -69,11 +79,11 @@ impl Transport {
                 screen::may_pass(frame.source, &origins, to)
             };
             let passes = is_addressed && (!has_limits || is_open());
-            passes.then_some(true).ok_or(Unaccepted::Source)
+            stopped += u64::from(!passes);
+            passes
         })?;
-        let stopped = screened.frames.iter().filter(|(_, it)| it.is_err()).count();
-        self.counters.add_many(Counter::Separated, stopped as u64);
-        screened.passed
+        self.counters.add_many(Counter::Separated, stopped);
+        passed
     }
 
     /// Records what components tell the peer about its control.
@@ -140,70 +150,91 @@ impl Transport {
             self.handle_hello(now, id, octets);
             return;
         }
-        let Some(octets) = self.undisputed(now, id, octets) else {
-            return;
-        };
-        let Some(session) = self.sessions.get_mut(&id) else {
-            return;
-        };
-        let Some(peer) = session.established() else {
-            return;
-        };
-        let Some(screened) = screen::incoming(peer, (&self.table, !self.is_refusing), &octets)
-        else {
+        let mut narrowed = Vec::new();
+        let each = |frame: &Frame| self.handle_frame(now, id, frame, &mut narrowed);
+        let Some(passed) = screen::screen(octets, each) else {
             self.counters.add(Counter::Malformed);
             return;
         };
-        session.received += 1;
-        for (frame, checked) in &screened.frames {
-            self.handle_decision(now, id, frame, *checked);
+        if let Some(session) = self.sessions.get_mut(&id) {
+            session.received += 1;
         }
-        let is_part = |frame: &Frame| frame.flags.data() != DataControl::Single;
-        let has_parts = screened.frames.iter().any(|(frame, _)| is_part(frame));
-        let passed = match screened.passed {
-            Some(datagram) if has_parts => self.continued(id, &datagram),
-            passed => passed,
-        };
-        for octets in passed.into_iter().chain(screened.narrowed) {
+        let narrowed = narrowed.iter().filter_map(|copy| judp::encode(copy).ok());
+        for octets in passed.into_iter().chain(narrowed) {
             let session = id;
             self.arrivals
                 .push_back(Arrival::Datagram { session, octets });
         }
     }
 
-    /// A datagram without later fragments that continue no message of this session.
-    fn continued(&mut self, id: SessionId, datagram: &Bytes) -> Option<Bytes> {
-        let mut stopped = 0;
-        let screened = screen::screen(datagram, |frame| {
-            let passes = self.fragments.admit(id, frame);
-            stopped += u64::from(!passes);
-            Ok(passes)
-        })?;
-        self.counters.add_many(Counter::StrayFragments, stopped);
-        screened.passed
-    }
-
-    /// Records the decision on a frame of the peer; of a refused one, tells the peer.
-    fn handle_decision(
+    /// Decides on a frame of the peer; returns whether it passes as it is. If it passes to a part of the
+    /// ids that it is for, adds a copy for each.
+    fn handle_frame(
         &mut self,
         now: Instant,
         id: SessionId,
         frame: &Frame,
-        checked: Result<(), Unaccepted>,
-    ) {
-        let Some(decision) = Decision::of(frame, checked, &self.table) else {
-            return;
-        };
-        match checked {
-            Ok(()) => {}
-            // Of a peer that speaks for others, nobody can be answered.
-            Err(Unaccepted::Source) => self.counters.add(Counter::ForeignIds),
-            Err(Unaccepted::Rule(_)) => {
-                self.counters.add(Counter::RuleForbids);
-                self.answer_refusal(now, id, frame, &decision.to_string());
+        narrowed: &mut Vec<Frame>,
+    ) -> bool {
+        let checked = self.check(now, id, frame);
+        let accepted = match checked {
+            Ok(_) => Ok(()),
+            Err(Refused::Unaccepted(why)) => Err(why),
+            Err(Refused::Disputed(holder)) => {
+                self.refuse_disputed(now, id, holder, frame);
+                return false;
             }
+            Err(Refused::Stray) => {
+                self.counters.add(Counter::StrayFragments);
+                return false;
+            }
+        };
+        if let Some(decision) = Decision::of(frame, accepted, &self.table) {
+            match accepted {
+                Ok(()) => {}
+                // Of a peer that speaks for others, nobody can be answered.
+                Err(Unaccepted::Source) => self.counters.add(Counter::ForeignIds),
+                Err(Unaccepted::Rule(_)) => {
+                    self.counters.add(Counter::RuleForbids);
+                    self.answer_refusal(now, id, frame, &decision.to_string());
+                }
+            }
+            self.record(id, Act::Decided(decision));
         }
-        self.record(id, Act::Decided(decision));
+        let Ok(admitted) = checked else {
+            return false;
+        };
+        let copies = admitted.copies(frame);
+        let passes_whole = copies.is_none();
+        narrowed.extend(copies.into_iter().flatten());
+        passes_whole
+    }
+
+    /// Whether a frame of the peer may pass: its source is an id of the peer, which no other program with
+    /// the same key uses, the rules allow it, it can be recorded, and a fragment continues a message of
+    /// this session.
+    fn check(&mut self, now: Instant, id: SessionId, frame: &Frame) -> Result<Admitted, Refused> {
+        let (table, source) = (&self.table, frame.source);
+        let peer = self.sessions.get(&id).and_then(Session::established);
+        let peer = peer.filter(|it| it.speaks_for(source));
+        let peer = peer.ok_or(Refused::Unaccepted(Unaccepted::Source))?;
+        let other = self.other_user(now, id, peer.key, source);
+        // A stop does not fail because two programs use one id.
+        if let Some(other) = other.filter(|_| !only_stops(frame, table)) {
+            return Err(Refused::Disputed(other));
+        }
+        let rule = |why| Refused::Unaccepted(Unaccepted::Rule(why));
+        let admitted = peer.rules.admit(frame, table).map_err(rule)?;
+        if self.is_refusing {
+            check_unrecorded(frame, table).map_err(rule)?;
+        }
+        if !self.fragments.admit(id, frame) {
+            return Err(Refused::Stray);
+        }
+        if let Some(session) = self.sessions.get_mut(&id).filter(|_| other.is_none()) {
+            session.used.note(now, source);
+        }
+        Ok(admitted)
     }
 
     /// Tells the peer what was refused: in the words of JAUS if it asked for control, and in a
@@ -250,22 +281,16 @@ impl Transport {
         });
     }
 
-    /// Adds a record. If too many wait, it is counted instead: a flood of refusals, or of what everybody
-    /// may do, leaves room for what needs a right, and no record displaces another.
+    /// Adds a record.
     pub(super) fn push_record(&mut self, record: Record) {
-        let most = match record.act.weight() {
-            Weight::Refusal | Weight::Free => MOST_RECORDS,
-            Weight::Evidence => 2 * MOST_RECORDS,
-        };
-        if self.records.len() < most {
-            self.records.push_back(record);
-        } else {
+        if !self.records.push(record) {
             self.counters.add(Counter::RecordsLost);
         }
     }
 
-    /// The next record for an audit log. If 256 wait, refusals and what everybody may do are only counted.
-    pub fn poll_record(&mut self) -> Option<Record> {
-        self.records.pop_front()
+    /// The next record for an audit log, and how often it came. Those for which the queue has no room are
+    /// counted as [`Counter::RecordsLost`].
+    pub fn poll_record(&mut self) -> Option<(Record, u64)> {
+        self.records.pop()
     }
 }

@@ -77,6 +77,37 @@ fn an_id_remains_with_the_living_program_that_uses_it() {
 }
 
 #[test]
+fn a_stop_passes_from_an_id_that_another_program_uses() {
+    let (mut network, ..) = vehicle_and_programs(2);
+    let report = judp("101.1.33", 20);
+    let raw = |payload: &'static [u8]| {
+        let (source, vehicle) = (JausId::new(60, 1, 1), JausId::new(101, 1, 1));
+        judp::encode(&Frame::new(source, vehicle, Bytes::from_static(payload))).unwrap()
+    };
+    let (stop, release) = (raw(b"\x06\0\x01\0"), raw(b"\x0E\0"));
+    let hold = judp("60.1.1", 20);
+    network.send(1, Priority::Standard, &hold);
+    network.run(SECOND);
+    for datagram in [&stop, &release, &report] {
+        network.send(2, Priority::Standard, datagram);
+        network.run(SECOND);
+    }
+    network.send(1, Priority::Standard, &hold);
+    network.run(SECOND);
+    assert_eq!(received(&mut network, 0), [hold.clone(), stop, hold]);
+    let counts = [Counter::DisputedIds, Counter::ForeignIds];
+    assert_eq!(counts.map(|it| network.count(0, it)), [1, 1]);
+    let transport = &mut network.hosts[0].transport;
+    let acts = std::iter::from_fn(|| transport.poll_record()).map(|(it, _)| it.act);
+    let decided = acts.filter(|it| matches!(it, Act::Decided(_) | Act::DisputedId { .. }));
+    assert_eq!(
+        decided.count(),
+        3,
+        "the stop, the release, and the foreign id"
+    );
+}
+
+#[test]
 fn a_program_that_was_killed_and_started_again_has_its_id_within_two_seconds() {
     let (mut network, rover, operator) = vehicle_and_programs(2);
     let old = judp("60.1.1", 20);

@@ -34,8 +34,8 @@ fn message(source: &str, destination: &str, message: &impl jaus::codec::Message)
 
 fn records(network: &mut Network, host: usize) -> Vec<Act> {
     let transport = &mut network.hosts[host].transport;
-    std::iter::from_fn(|| transport.poll_record())
-        .map(|it| it.act)
+    let each = std::iter::from_fn(|| transport.poll_record());
+    each.flat_map(|(record, times)| (0..times).map(move |_| record.act.clone()))
         .collect()
 }
 
@@ -344,9 +344,10 @@ fn each_answer_about_control_and_its_loss_are_recorded() {
 fn refused_messages_do_not_displace_the_record_of_what_was_done() {
     let (mut network, ..) = vehicle_with_rules("");
     let stop = message("60.1.1", "101.1.1", &SetEmergency::default());
-    let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());
     network.send(1, Priority::Standard, &stop);
-    for _ in 0..1000 {
+    for number in 0..1000 {
+        let to = format!("101.{}.{}", 1 + number / 250, 1 + number % 250);
+        let wrench = message("60.1.1", &to, &SetWrenchEffort::default());
         network.send(1, Priority::Standard, &wrench);
     }
     network.run(5 * SECOND);
