@@ -92,6 +92,12 @@ impl Access {
         }
     }
 
+    /// Whether an entry of [`bind`](Self::bind) says where this id comes from.
+    #[must_use]
+    pub fn binds(&self, id: JausId) -> bool {
+        self.bind.iter().any(|it| it.ids.matches(id))
+    }
+
     /// Checks what a message needs that comes from this remote end, and says to which ids it may go.
     ///
     /// # Errors

@@ -79,6 +79,12 @@ impl Remote {
         }
     }
 
+    /// Whether it is an authenticated session.
+    #[must_use]
+    pub const fn is_session(self) -> bool {
+        matches!(self, Self::Session(_))
+    }
+
     /// The address, if it has one.
     #[must_use]
     pub const fn socket(self) -> Option<SocketAddr> {

@@ -93,6 +93,9 @@ use rate::{Gate, Origin};
 use recent::Recent;
 use verify::Warnings;
 
+/// The ids for which the remote ends of each link alone may speak.
+type Reserved = BTreeMap<LinkId, Vec<JausId>>;
+
 /// The protocol core of a node. See the [module](self).
 #[derive(Debug)]
 pub struct Endpoint {
@@ -101,6 +104,7 @@ pub struct Endpoint {
     components: BTreeSet<JausId>,
     /// The rights of those that may not send everything.
     restricted: BTreeMap<JausId, Rules>,
+    reserved: Reserved,
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
@@ -126,6 +130,12 @@ pub struct Endpoint {
     counters: Counters,
 }
 
+/// Whether only sessions may speak for this id, and this is none.
+fn is_reserved(reserved: &Reserved, access: &Access, id: JausId, from: Remote) -> bool {
+    let mut ids = reserved.values().flatten();
+    !from.is_session() && ids.any(|ids| ids.matches(id)) && !access.binds(id)
+}
+
 impl Endpoint {
     /// Creates an endpoint without components and links.
     #[must_use]
@@ -139,6 +149,7 @@ impl Endpoint {
         Self {
             components: BTreeSet::new(),
             restricted: BTreeMap::new(),
+            reserved: BTreeMap::new(),
             peers: Peers::new(config.clone()),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.limits),
@@ -201,17 +212,28 @@ impl Endpoint {
         self.egress.links.insert(link, profile);
     }
 
+    /// Believes messages from these ids, with wildcards, only if they come by sessions, such as those of
+    /// this link, which prove who sends; or from where [`Access::bind`] binds the id to. Replaces what was
+    /// reserved for the link before.
+    pub fn reserve(&mut self, link: LinkId, ids: Vec<JausId>) {
+        self.reserved.insert(link, ids);
+        let (reserved, access) = (&self.reserved, &self.config.access);
+        self.peers
+            .forget_paths(|id, path| is_reserved(reserved, access, id, path.peer));
+    }
+
     /// Removes a link, the routes learned through it and the datagrams queued on it, which are
     /// counted.
     pub fn remove_link(&mut self, link: LinkId) {
-        self.peers.forget_paths(|path| path.link == link);
+        self.reserved.remove(&link);
+        self.peers.forget_paths(|_, path| path.link == link);
         let lost = self.egress.remove_link(link);
         self.counters.add_many(Counter::LinkGone, lost);
     }
 
     /// Reports that a connection has closed: the routes learned through it are forgotten.
     pub fn forget_path(&mut self, path: Path) {
-        self.peers.forget_paths(|known| known == path);
+        self.peers.forget_paths(|_, known| known == path);
     }
 
     /// Replaces the static peers, for instance because links were added or removed.

@@ -12,7 +12,7 @@ use super::duplicates::Novelty;
 use super::peers::is_challenge;
 use super::recent::Fingerprint;
 use super::verify::Warning;
-use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
+use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink, is_reserved};
 use crate::address::JausId;
 use crate::peer::{self, Sign};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
@@ -246,7 +246,7 @@ impl Endpoint {
         Err(Counter::UnawaitedAcknowledgement)
     }
 
-    /// Refuses senders that are denied by id, or bound or configured to be at another address.
+    /// Refuses senders that are denied by id, that belong to a secure link, or bound or configured to be at another address.
     fn refuse_misplaced(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
         let (id, path) = (arrival.frame.source, arrival.path);
         self.config.access.check_subsystem(id)?;
@@ -255,6 +255,16 @@ impl Endpoint {
                 warn!(%id, from = %path.peer, "refused: `access.bind` binds this id to other networks");
             }
             return Err(Counter::BoundElsewhere);
+        }
+        if is_reserved(&self.reserved, &self.config.access, id, path.peer) {
+            if self.warnings.is_due(arrival.now, Warning::Reserved) {
+                warn!(
+                    %id, from = %path.peer,
+                    "refused: this id belongs to a peer of the secure link. If another component has it, give \
+                     the key of that peer narrower ids, or bind the id to its network (`access.bind`)"
+                );
+            }
+            return Err(Counter::ReservedId);
         }
         if !self.peers.is_pinned_elsewhere(id, path) {
             return Ok(());

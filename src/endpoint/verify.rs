@@ -37,12 +37,13 @@ pub(super) enum Warning {
     BoundElsewhere,
     NotGranted,
     OwnNotGranted,
+    Reserved,
     Unverified,
 }
 
 /// When each warning was last logged.
 #[derive(Debug, Default)]
-pub(super) struct Warnings([Option<Instant>; 9]);
+pub(super) struct Warnings([Option<Instant>; 10]);
 
 impl Warnings {
     /// Whether a warning may be logged again.

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
+use crate::address::JausId;
 use crate::counters::Count;
 use crate::endpoint::{SessionId, Transmit};
 
@@ -57,4 +58,7 @@ pub enum Arrival {
     },
     /// The session has ended.
     Closed(SessionId),
+    /// From now on these ids, with wildcards, are those of the remote ends of this link: the node believes
+    /// no other link's messages from them, unless its settings bind the id to where they come from.
+    Speaks(Vec<JausId>),
 }

@@ -199,6 +199,7 @@ impl Link {
                         custom::Arrival::Closed(session) => {
                             endpoint.forget_path(from(Remote::Session(session)));
                         }
+                        custom::Arrival::Speaks(ids) => endpoint.reserve(id, ids),
                     }
                 }
                 true

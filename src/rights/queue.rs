@@ -31,17 +31,17 @@ impl<T: Weighted> WeightedQueue<T> {
     /// Adds a record, or counts it with an equal one; returns whether there was room.
     pub fn push(&mut self, record: T) -> bool {
         let weight = record.weight();
-        let alike = self.0.iter_mut().filter(|(it, _)| it.weight() == weight);
-        let mut alike: Vec<_> = alike.collect();
-        let first = match weight {
-            Weight::Evidence => alike.len().saturating_sub(1),
-            Weight::Refusal | Weight::Free => 0,
+        let mut alike = self.0.iter_mut().filter(|(it, _)| it.weight() == weight);
+        let known = match weight {
+            Weight::Evidence => alike.next_back().filter(|(it, _)| *it == record),
+            Weight::Refusal | Weight::Free => alike.find(|(it, _)| *it == record),
         };
-        if let Some((_, times)) = alike[first..].iter_mut().find(|(it, _)| *it == record) {
+        if let Some((_, times)) = known {
             *times += 1;
             return true;
         }
-        let has_room = alike.len() < MOST_WAITING;
+        let alike = self.0.iter().filter(|(it, _)| it.weight() == weight);
+        let has_room = alike.count() < MOST_WAITING;
         if has_room {
             self.0.push_back((record, 1));
         }

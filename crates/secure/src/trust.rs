@@ -428,6 +428,13 @@ impl TrustFile {
         trust.peers().iter().map(|peer| peer.key).collect()
     }
 
+    /// The ids of all trusted keys.
+    pub(crate) fn ids(&self) -> Vec<JausId> {
+        let trust = self.0.get();
+        let ids = trust.peers().iter().flat_map(|peer| &peer.ids);
+        ids.copied().collect()
+    }
+
     /// How often the trust was replaced.
     pub(crate) fn edition(&self) -> u64 {
         self.0.edition()

@@ -349,16 +349,16 @@ impl Peers {
     }
 
     /// Forgets the routes on paths that are gone.
-    pub(super) fn forget_paths(&mut self, gone: impl Fn(Path) -> bool) {
+    pub(super) fn forget_paths(&mut self, gone: impl Fn(JausId, Path) -> bool) {
         let ids: Vec<_> = self.states.keys().copied().collect();
         for id in ids {
             let Some(state) = self.get(id) else {
                 continue;
             };
             let mut probes = state.challenge.iter().flat_map(Challenge::probes);
-            if gone(state.peer.path) {
+            if gone(id, state.peer.path) {
                 self.remove(id);
-            } else if probes.any(|probe| gone(probe.path)) {
+            } else if probes.any(|probe| gone(id, probe.path)) {
                 self.change(id, |state| state.challenge = None);
             }
         }

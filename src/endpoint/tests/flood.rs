@@ -260,7 +260,11 @@ fn a_flood_of_refusals_does_not_displace_what_was_done() {
     for number in 0..1000 {
         rig.hear(&Frame {
             sequence: number,
-            ..Frame::new(PEER, US, Bytes::from(vec![number as u8, 0xDA, 0]))
+            ..Frame::new(
+                PEER,
+                US,
+                Bytes::from(vec![number as u8, 0xDA + (number >> 8) as u8, 0]),
+            )
         });
     }
     rig.hear(&from_peer(b"\x06\x00\x01\x00"));

@@ -16,6 +16,7 @@ mod junior;
 mod output;
 mod profiles;
 mod receiving;
+mod reserved;
 mod restricted;
 mod routes;
 mod routing;

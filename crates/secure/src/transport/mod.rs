@@ -37,6 +37,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
+use jaus::address::JausId;
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
 use jaus::rights::{Table, WeightedQueue};
@@ -103,6 +104,8 @@ pub struct Transport {
     handles: HashMap<ConnectionHandle, SessionId>,
     next: u64,
     arrivals: VecDeque<Arrival>,
+    /// The ids for which peers may speak, as the node was told last.
+    spoken: Vec<JausId>,
     /// The unfinished messages of all sessions.
     fragments: Fragments,
     /// Answers outside of connections.
@@ -137,7 +140,7 @@ impl Transport {
         let tokens = Tokens::new(&credentials);
         let (server, client) = parameters::of_sides(&credentials, &refusals, &tokens);
         let config = Arc::new(parameters::of_endpoint(&credentials.own_key()));
-        Self {
+        let mut transport = Self {
             own,
             instance: Instance::random(),
             table: Table::default(),
@@ -158,6 +161,7 @@ impl Transport {
             handles: HashMap::new(),
             next: 0,
             arrivals: VecDeque::new(),
+            spoken: Vec::new(),
             fragments: Fragments::default(),
             responses: VecDeque::new(),
             responded: 0,
@@ -166,7 +170,9 @@ impl Transport {
             budget: None,
             turns: 0,
             buffer: Vec::new(),
-        }
+        };
+        transport.tell_spoken();
+        transport
     }
 
     /// Decides by this table what messages need; without it by the catalogue's.
@@ -377,6 +383,7 @@ impl Transport {
             }
             None => session.greet(self.instance),
         }
+        self.tell_spoken();
         self.record(id, Act::Connected);
     }
 

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use jaus::link::custom::Arrival;
+
 use super::session::Session;
 use super::{Counter, Transport, code, parameters};
 
@@ -63,6 +65,26 @@ impl Transport {
         }
         for id in refused {
             self.end(now, id, code::REVOKED, NOT_ACCEPTED);
+        }
+        if changed {
+            self.tell_spoken();
+        }
+    }
+
+    /// Tells the node for which ids the peers may speak, so that it believes nobody else in these ids:
+    /// those of all trusted keys, and those of the certificates that were shown so far.
+    pub(super) fn tell_spoken(&mut self) {
+        let mut spoken = self.credentials.trust().ids();
+        let certified = self.sessions.values().filter_map(Session::established);
+        spoken.extend(certified.flat_map(|peer| peer.ids.iter().copied()));
+        if self.credentials.uses_certificates() {
+            spoken.append(&mut self.spoken.clone());
+        }
+        spoken.sort_unstable();
+        spoken.dedup();
+        if spoken != self.spoken {
+            self.spoken.clone_from(&spoken);
+            self.arrivals.push_back(Arrival::Speaks(spoken));
         }
     }
 

@@ -31,6 +31,8 @@ struct Host {
     transport: Transport,
     received: Vec<Bytes>,
     closed: Vec<SessionId>,
+    /// The ids for which the peers may speak, as the node was told last.
+    spoken: Vec<JausId>,
 }
 
 /// Hosts that exchange UDP datagrams.
@@ -92,6 +94,7 @@ impl Network {
             transport,
             received: Vec::new(),
             closed: Vec::new(),
+            spoken: Vec::new(),
         });
         self.hosts.len() - 1
     }
@@ -112,6 +115,7 @@ impl Network {
                 match arrival {
                     Arrival::Datagram { octets, .. } => host.received.push(octets),
                     Arrival::Closed(session) => host.closed.push(session),
+                    Arrival::Speaks(ids) => host.spoken = ids,
                 }
             }
         }
@@ -265,8 +269,11 @@ fn a_key_speaks_only_for_its_own_ids() {
 #[test]
 fn a_revoked_key_loses_its_session_and_gets_no_other() {
     let (mut network, trust, _) = vehicle_and_operator();
+    let ids: JausId = "60.255.255".parse().unwrap();
+    assert_eq!(network.hosts[0].spoken, [ids]);
     trust[0].replace(Trust::default());
     network.run(SECOND);
+    assert_eq!(network.hosts[0].spoken, [], "others may have them now");
     assert_eq!(network.hosts[0].closed.len(), 1);
     assert_eq!(network.hosts[1].closed.len(), 1);
     network.run(10 * SECOND);

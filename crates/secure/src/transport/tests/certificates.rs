@@ -154,6 +154,8 @@ fn a_line_of_the_trust_file_narrows_the_ids_of_a_certificate() {
 #[test]
 fn a_revoked_certificate_loses_its_session_within_two_seconds_and_gets_no_other() {
     let (mut network, team, credentials) = certified();
+    let spoken: [JausId; 1] = ["60.255.255".parse().unwrap()];
+    assert_eq!(network.hosts[0].spoken, spoken);
     team.authority.revoke("operator", at(NOW)).unwrap();
     credentials[0].reload().unwrap();
     network.run(2 * SECOND);
@@ -162,6 +164,7 @@ fn a_revoked_certificate_loses_its_session_within_two_seconds_and_gets_no_other(
     assert_no_session(&network);
     assert!(network.count(0, Counter::RefusedRevoked) > 0);
     assert_eq!(network.count(0, Counter::SessionsEstablished), 1);
+    assert_eq!(network.hosts[0].spoken, spoken, "nobody else gets its ids");
 }
 
 #[test]
