@@ -141,6 +141,42 @@ async fn a_relay_joins_nodes_that_have_no_link_with_each_other() {
 }
 
 #[tokio::test]
+async fn who_comes_first_with_the_id_of_a_peer_on_a_plain_link_gets_none_of_its_messages() {
+    const ROVER: u16 = 11_501;
+    let folder = tempfile::tempdir().unwrap();
+    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
+    let any = "127.0.0.1:0".parse().unwrap();
+    let trust = trusting("client", &client_key, "11502.255.255");
+    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let settings = Settings::new(any).connect(at_rover.local().unwrap());
+    let trust = trusting("rover", &rover_key, "11501.255.255");
+    let at_client = SecureLink::open(&client_key, trust, settings).unwrap();
+
+    let config = Config::loopback(ROVER, 1);
+    let at_rover = Node::start_with(config, vec![Box::new(at_rover)]).unwrap();
+    let rover = sensor(&at_rover);
+    let report = ReportAccelerationState::default();
+    rover.publish(report, SystemTime::now()).await.unwrap();
+    let plain = |subsystem| Node::start(Config::loopback(subsystem, 1)).unwrap();
+    let (forger, stranger) = (plain(11_502), plain(11_503));
+    let query = QueryAccelerationState::none().with_acceleration_x();
+    let exchange = async {
+        // A plain link that works answers others.
+        client(&stranger).query(rover.id(), &query).await.unwrap();
+        let forged = client(&forger);
+        assert!(forged.query(rover.id(), &query).await.is_err());
+        let at_client = node(11_502, at_client);
+        let truly = client(&at_client);
+        truly.query(rover.id(), &query).await.unwrap();
+        assert!(forged.query(rover.id(), &query).await.is_err());
+        truly.query(rover.id(), &query).await.unwrap();
+    };
+    tokio::time::timeout(LIMIT, exchange)
+        .await
+        .expect("an answer");
+}
+
+#[tokio::test]
 async fn a_node_that_is_shut_down_tells_its_peers() {
     let folder = tempfile::tempdir().unwrap();
     let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
