@@ -27,7 +27,7 @@ pub(super) const HELLO: u8 = 0xFD;
 /// The octets of an instance.
 const LENGTH: usize = 16;
 /// The least time, and the round trips, within which a sign of life of the owner of an id must come.
-pub(super) const ANSWER: Duration = Duration::from_secs(1);
+const ANSWER: Duration = Duration::from_secs(1);
 const ANSWER_ROUND_TRIPS: u32 = 4;
 /// Pings in that time, while nothing is heard. At a loss of 30 % each way, all fail once in 50 000 times.
 const PINGS: u32 = 16;
