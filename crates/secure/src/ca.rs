@@ -180,7 +180,7 @@ impl CertificateAuthority {
             Certificate::from_der(issued.der()).map_err(|defect| self.defect(defect))?;
         let _alone = self.lock()?;
         self.append(&Issued::of(&certificate))?;
-        Ok(pem("CERTIFICATE", issued.der()))
+        Ok(pem("CERTIFICATE", issued.der()).to_string())
     }
 
     /// Revokes the certificates with this name, or the one with this serial number, and writes the

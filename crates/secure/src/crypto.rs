@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
+use rustls::Error;
 use rustls::crypto::CryptoProvider;
+use rustls::pki_types::PrivatePkcs8KeyDer;
+use rustls::sign::SigningKey;
 
 #[cfg(not(any(feature = "aws-lc", feature = "ring")))]
 compile_error!("choose a library of cryptographic primitives: the feature `ring` or `aws-lc`");
@@ -25,6 +28,11 @@ pub(crate) use webpki::ring::ED25519;
 /// What TLS and signatures are made of.
 pub(crate) fn provider() -> Arc<CryptoProvider> {
     Arc::new(tls::default_provider())
+}
+
+/// An Ed25519 key, from its PKCS #8 encoding.
+pub(crate) fn signing_key(der: &PrivatePkcs8KeyDer<'_>) -> Result<Arc<dyn SigningKey>, Error> {
+    tls::sign::any_eddsa_type(der)
 }
 
 /// The library of cryptographic primitives in this build: `ring`, `aws-lc-rs`, or `aws-lc-rs (FIPS)`

@@ -118,13 +118,17 @@ mod token {
 pub struct Key {
     signing: Arc<dyn SigningKey>,
     public: PublicKey,
+    /// Whether a device signs, which takes its time.
+    is_slow: bool,
 }
 
 impl Key {
     /// Whether this names a key in a token, by a PKCS #11 URI (RFC 7512), and not a file.
     #[must_use]
     pub fn is_in_token(path: &Path) -> bool {
-        path.to_str().is_some_and(|it| it.starts_with(TOKEN))
+        let text = path.as_os_str().as_encoded_bytes();
+        let scheme = text.get(..TOKEN.len());
+        scheme.is_some_and(|it| it.eq_ignore_ascii_case(TOKEN.as_bytes()))
     }
 
     /// Makes a new key and writes it to a file that only its owner can read. With a PKCS #11 URI in place
@@ -166,19 +170,18 @@ impl Key {
         if is_sealed(pem) {
             return Err(KeyError::Sealed(path.to_owned()));
         }
-        let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok();
-        der.and_then(|it| Self::from_pkcs8(it.secret_pkcs8_der()))
-            .ok_or_else(|| KeyError::Malformed(path.to_owned()))
+        let key = decoded(pem).and_then(|it| Self::from_pkcs8(it.secret_pkcs8_der()));
+        key.ok_or_else(|| KeyError::Malformed(path.to_owned()))
     }
 
     fn from_pkcs8(octets: &[u8]) -> Option<Self> {
-        let der = PrivatePkcs8KeyDer::from(octets.to_vec());
-        let signing = crypto::provider()
-            .key_provider
-            .load_private_key(der.into())
-            .ok()?;
+        let signing = crypto::signing_key(&octets.into()).ok()?;
         let public = PublicKey::from_spki(signing.public_key()?.as_ref())?;
-        Some(Self { signing, public })
+        Some(Self {
+            signing,
+            public,
+            is_slow: false,
+        })
     }
 
     /// The files that a key is read from: none for a key in a token.
@@ -234,6 +237,18 @@ impl Key {
     pub(crate) fn sign(&self, message: &[u8]) -> Option<Vec<u8>> {
         let signer = self.signing.choose_scheme(&[SignatureScheme::ED25519])?;
         signer.sign(message).ok()
+    }
+
+    /// Whether each signature costs so much that only peers with a proven address get one.
+    pub(crate) const fn is_slow(&self) -> bool {
+        self.is_slow
+    }
+
+    /// The same, as if it were in a token.
+    #[cfg(test)]
+    pub(crate) fn slow(self) -> Self {
+        let is_slow = true;
+        Self { is_slow, ..self }
     }
 
     pub(crate) fn signing(&self) -> Arc<dyn SigningKey> {
@@ -331,10 +346,13 @@ impl Fingerprint {
     }
 }
 
-/// The PEM encoding of octets.
-pub(crate) fn pem(label: &str, octets: &[u8]) -> String {
-    let base64 = BASE64.encode(octets);
-    let mut text = format!("-----BEGIN {label}-----\n");
+/// The PEM encoding of octets, in one allocation, so that no copy remains.
+pub(crate) fn pem(label: &str, octets: &[u8]) -> Zeroizing<String> {
+    let base64 = Zeroizing::new(BASE64.encode(octets));
+    let [begin, end] = ["BEGIN", "END"].map(|it| format!("-----{it} {label}-----\n"));
+    let length = base64.len() + base64.len() / PEM_LINE + 1;
+    let mut text = Zeroizing::new(String::with_capacity(begin.len() + length + end.len()));
+    text.push_str(&begin);
     let mut rest = base64.as_str();
     while !rest.is_empty() {
         let (line, after) = rest.split_at(rest.len().min(PEM_LINE));
@@ -342,7 +360,14 @@ pub(crate) fn pem(label: &str, octets: &[u8]) -> String {
         text.push('\n');
         rest = after;
     }
-    text + &format!("-----END {label}-----\n")
+    text.push_str(&end);
+    text
+}
+
+/// The PKCS #8 encoding in the PEM of a plain key.
+fn decoded(pem: &[u8]) -> Option<Zeroizing<PrivatePkcs8KeyDer<'static>>> {
+    let der = PrivatePkcs8KeyDer::from_pem_slice(pem).ok();
+    der.map(Zeroizing::new)
 }
 
 fn in_file(path: &Path, source: io::Error) -> KeyError {

@@ -257,14 +257,11 @@ fn a_refused_request_is_answered_and_recorded_once_with_its_number() {
 #[test]
 fn a_flood_of_refusals_does_not_displace_what_was_done() {
     let mut rig = watched();
-    for number in 0..1000 {
+    for number in 0..1000_u16 {
+        let [low, high] = number.to_le_bytes();
         rig.hear(&Frame {
             sequence: number,
-            ..Frame::new(
-                PEER,
-                US,
-                Bytes::from(vec![number as u8, 0xDA + (number >> 8) as u8, 0]),
-            )
+            ..Frame::new(PEER, US, Bytes::from(vec![low, 0xDA + high, 0]))
         });
     }
     rig.hear(&from_peer(b"\x06\x00\x01\x00"));

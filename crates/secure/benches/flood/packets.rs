@@ -1,6 +1,6 @@
 //! Datagrams for a node without sockets.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -9,8 +9,8 @@ use jaus::wire::{Frame, Priority, judp};
 use jaus_secure::transport::Transport;
 use jaus_secure::{Key, Trust, TrustFile};
 
-const VEHICLE: ([u8; 4], u16) = ([10, 0, 0, 1], 3795);
-const OPERATOR: ([u8; 4], u16) = ([10, 0, 0, 2], 3795);
+const VEHICLE: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::new(10, 0, 0, 1)), 3795);
+const OPERATOR: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::new(10, 0, 0, 2)), 3795);
 /// The time between datagrams that are within every limit.
 const SLOW: Duration = Duration::from_micros(50);
 /// More first packets than a node answers at once.
@@ -55,11 +55,7 @@ impl Pair {
         let [vehicle, operator] = [&keys[0], &keys[1]];
         let mut pair = Self {
             vehicle: Transport::new(vehicle, trust("operator", operator, "60.255.255"), []),
-            operator: Transport::new(
-                operator,
-                trust("rover", vehicle, "101.255.255"),
-                [VEHICLE.into()],
-            ),
+            operator: Transport::new(operator, trust("rover", vehicle, "101.255.255"), [VEHICLE]),
             now: Instant::now(),
         };
         while pair.vehicle.sessions().next().is_none() || pair.operator.sessions().next().is_none()
@@ -77,12 +73,10 @@ impl Pair {
         self.operator.handle_timeout(now);
         self.vehicle.handle_timeout(now);
         while let Some(sent) = self.operator.poll_transmit(now, 1) {
-            self.vehicle
-                .handle_datagram(now, OPERATOR.into(), &sent.octets);
+            self.vehicle.handle_datagram(now, OPERATOR, &sent.octets);
         }
         while let Some(sent) = self.vehicle.poll_transmit(now, 1) {
-            self.operator
-                .handle_datagram(now, VEHICLE.into(), &sent.octets);
+            self.operator.handle_datagram(now, VEHICLE, &sent.octets);
         }
     }
 
@@ -115,7 +109,7 @@ impl Pair {
             while let Some(sent) = self.operator.poll_transmit(self.now, 1) {
                 let start = Instant::now();
                 self.vehicle
-                    .handle_datagram(self.now, OPERATOR.into(), &sent.octets);
+                    .handle_datagram(self.now, OPERATOR, &sent.octets);
                 while self.vehicle.poll_arrival().is_some() {
                     received += 1;
                 }
@@ -132,8 +126,7 @@ impl Pair {
         let (start, mut answers) = (Instant::now(), 0);
         for packet in packets {
             self.now += spacing;
-            self.vehicle
-                .handle_datagram(self.now, OPERATOR.into(), packet);
+            self.vehicle.handle_datagram(self.now, OPERATOR, packet);
             while self.vehicle.poll_transmit(self.now, 1).is_some() {
                 answers += 1;
             }
@@ -150,9 +143,8 @@ pub(crate) fn key() -> Key {
 /// The first packets of so many handshakes of a stranger.
 pub(crate) fn first_packets(count: usize) -> Vec<Bytes> {
     let (now, key) = (Instant::now(), key());
-    let vehicle = SocketAddr::from(VEHICLE);
     let first = |_| {
-        let mut stranger = Transport::new(&key, TrustFile::default(), [vehicle]);
+        let mut stranger = Transport::new(&key, TrustFile::default(), [VEHICLE]);
         stranger.handle_timeout(now);
         stranger
             .poll_transmit(now, 1)

@@ -8,10 +8,9 @@ use jaus_files::Readers;
 use pkcs8::pkcs5::pbes2::Parameters;
 use pkcs8::pkcs5::{self, scrypt};
 use pkcs8::{EncryptedPrivateKeyInfoRef, PrivateKeyInfoRef, SecretDocument};
-use rustls::pki_types::{PrivatePkcs8KeyDer, pem::PemObject as _};
 use zeroize::Zeroizing;
 
-use super::{Key, KeyError, SEALED, in_file, is_sealed, pem, publish, random, read};
+use super::{Key, KeyError, SEALED, decoded, in_file, is_sealed, pem, publish, random, read};
 
 /// The cost of a guess: 16 MiB five times, a recommendation of OWASP for scrypt, and within the 32 MiB
 /// with which OpenSSL reads a key by default.
@@ -99,7 +98,7 @@ fn encode(
     passphrase: Option<&Passphrase>,
 ) -> Result<Zeroizing<String>, KeyError> {
     let Some(passphrase) = passphrase else {
-        return Ok(Zeroizing::new(pem("PRIVATE KEY", der)));
+        return Ok(pem("PRIVATE KEY", der));
     };
     let (salt, iv) = (random::<16>()?, random()?);
     let parameters = scrypt::Params::new(LOG_N, BLOCK, PASSES)
@@ -114,7 +113,7 @@ fn encode(
             key.encrypt_with_params(it, passphrase.0.as_bytes()).ok()
         })
         .ok_or_else(|| KeyError::Malformed(path.to_owned()))?;
-    Ok(Zeroizing::new(pem(SEALED, sealed.as_bytes())))
+    Ok(pem(SEALED, sealed.as_bytes()))
 }
 
 /// The PKCS #8 encoding of the key in a file.
@@ -122,7 +121,7 @@ fn decode(path: &Path, passphrase: Option<&Passphrase>) -> Result<Zeroizing<Vec<
     let malformed = || KeyError::Malformed(path.to_owned());
     let text = read(path)?;
     if !is_sealed(&text) {
-        let der = PrivatePkcs8KeyDer::from_pem_slice(&text).map_err(|_| malformed())?;
+        let der = decoded(&text).ok_or_else(malformed)?;
         return Ok(Zeroizing::new(der.secret_pkcs8_der().to_vec()));
     }
     let passphrase = passphrase.ok_or_else(|| KeyError::Sealed(path.to_owned()))?;

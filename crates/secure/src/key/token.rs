@@ -1,9 +1,17 @@
 //! Keys in a token: a hardware security module, a smart card or another device with a PKCS #11
 //! library. The private key never leaves it.
+//!
+//! A thread of its own signs, because a token may be slow or away. The caller waits for [`LONGEST_WAIT`]
+//! at most, once: then each further signature fails at once until the token has answered. Peers that begin
+//! sessions get a quarter of the caller's time, so that they do not stall it together either.
 
 use std::fmt::{self, Display};
+use std::fs;
 use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, SystemTime};
 
 use cryptoki::context::{CInitializeArgs, CInitializeFlags, Pkcs11};
 use cryptoki::error::{Error, RvError};
@@ -12,27 +20,58 @@ use cryptoki::mechanism::eddsa::{EddsaParams, EddsaSignatureScheme};
 use cryptoki::object::{Attribute, AttributeType, KeyType, ObjectClass, ObjectHandle};
 use cryptoki::session::{Session, UserType};
 use cryptoki::slot::Slot;
+use jaus::node::now;
 use jaus_files::Readers;
+use jaus_limits::Bucket;
 use rustls::pki_types::SubjectPublicKeyInfoDer;
 use rustls::sign::{Signer, SigningKey};
 use rustls::{SignatureAlgorithm, SignatureScheme};
+use zeroize::Zeroizing;
 
 use super::uri::TokenUri;
 use super::{Key, KeyError, PublicKey};
+use crate::crypto::digest::{SHA256, digest};
 
 /// The curve of Ed25519 as a parameter (RFC 8410), and as older libraries expect it: its name.
 const CURVES: [&[u8]; 2] = [&[0x06, 0x03, 0x2B, 0x65, 0x70], b"\x13\x0Cedwards25519"];
 /// The longest file of a PIN, in octets.
 const LONGEST_PIN: u64 = 256;
 
-/// A private key in a token.
+/// How long a caller waits for a signature.
+const LONGEST_WAIT: Duration = Duration::from_millis(500);
+/// Of the caller's time, signatures take one part in so many.
+const SHARE: u32 = 4;
+/// The time that signatures may take at once, before they have to keep to their share.
+const BURST: Duration = Duration::from_secs(1);
+/// How long after a failure the token is not asked again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Attempts to log in that a token has refused.
+static REFUSED: Mutex<Vec<Vec<u8>>> = Mutex::new(Vec::new());
+
+/// A private key in a token, as TLS uses it.
+#[derive(Clone)]
 struct TokenKey {
-    uri: TokenUri,
     public: PublicKey,
-    open: Mutex<Open>,
+    signer: Arc<Mutex<SigningThread>>,
 }
 
-/// An open session, which one thread uses at a time.
+/// The thread that signs, as its callers see it.
+struct SigningThread {
+    jobs: SyncSender<Job>,
+    /// The answer that did not come in time.
+    late: Option<Receiver<Signed>>,
+    spent: Bucket,
+}
+
+struct Job {
+    message: Vec<u8>,
+    answer: SyncSender<Signed>,
+}
+
+type Signed = Result<Vec<u8>, Unusable>;
+
+/// An open session.
 struct Open {
     session: Session,
     key: ObjectHandle,
@@ -81,12 +120,24 @@ fn with_uri(
 
 fn key(uri: &TokenUri, open: Open) -> Result<Key, Unusable> {
     let public = public(&open.session, uri)?;
-    let (uri, open) = (uri.clone(), Mutex::new(open));
-    let key = Arc::new(TokenKey { uri, public, open });
+    let (uri, mut open) = (uri.clone(), Some(open));
+    let signer = SigningThread::start(move |message| sign(&uri, &mut open, message))?;
+    let signer = Arc::new(Mutex::new(signer));
     Ok(Key {
-        signing: Arc::new(TokenSigningKey(key)),
+        signing: Arc::new(TokenKey { public, signer }),
         public,
+        is_slow: true,
     })
+}
+
+/// Signs; opens another session once, because the token may have been away.
+fn sign(uri: &TokenUri, current: &mut Option<Open>, message: &[u8]) -> Signed {
+    if let Some(Ok(signature)) = current.as_ref().map(|it| it.sign(message)) {
+        return Ok(signature);
+    }
+    // It is closed before: a library that has forgotten it may give its number to the next one.
+    drop(current.take());
+    Ok(current.insert(open(uri)?).sign(message)?)
 }
 
 fn open(uri: &TokenUri) -> Result<Open, Unusable> {
@@ -108,13 +159,55 @@ fn login(uri: &TokenUri) -> Result<Session, Unusable> {
     let Some(file) = &uri.pin else {
         return Ok(session);
     };
-    let pin = jaus_files::read_text(file, Readers::Owner, LONGEST_PIN)
-        .map_err(|error| format!("the file of the PIN {}: {error}", file.display()))?;
+    log_in(&session, uri, file)?;
+    Ok(session)
+}
+
+/// Logs in, but with no PIN that the token has refused: after a few wrong ones it locks.
+fn log_in(session: &Session, uri: &TokenUri, file: &Path) -> Result<(), Unusable> {
+    let name = file.display();
+    let pin = jaus_files::read(file, Readers::Owner, LONGEST_PIN)
+        .map_err(|error| format!("the file of the PIN {name}: {error}"))?;
+    let pin = Zeroizing::new(pin);
+    let pin = std::str::from_utf8(&pin).map_err(|_| format!("the PIN in {name} is not UTF-8"))?;
     let pin = pin.lines().next().unwrap_or_default();
-    match session.login(UserType::User, Some(&pin.into())) {
-        Ok(()) | Err(Error::Pkcs11(RvError::UserAlreadyLoggedIn, _)) => Ok(session),
-        Err(error) => Err(error.into()),
+    let attempt = attempt(uri, file, pin);
+    let mut refused = REFUSED.lock().unwrap_or_else(PoisonError::into_inner);
+    if refused.contains(&attempt) {
+        return Err(format!(
+            "the token has refused the PIN in {name}: it is not tried again until that file changes, because \
+             a token locks after a few wrong ones"
+        )
+        .into());
     }
+    match session.login(UserType::User, Some(&pin.into())) {
+        Ok(()) | Err(Error::Pkcs11(RvError::UserAlreadyLoggedIn, _)) => Ok(()),
+        Err(error) => {
+            if is_about_pin(&error) {
+                refused.push(attempt);
+            }
+            Err(format!("with the PIN in {name}: {error}").into())
+        }
+    }
+}
+
+/// What makes an attempt to log in another one: the token, the PIN, and the time of its file.
+fn attempt(uri: &TokenUri, file: &Path, pin: &str) -> Vec<u8> {
+    let changed = fs::metadata(file).and_then(|it| it.modified()).ok();
+    let since = changed.and_then(|it| it.duration_since(SystemTime::UNIX_EPOCH).ok());
+    let text = Zeroizing::new(format!("{uri:?} {since:?} {pin}"));
+    digest(&SHA256, text.as_bytes()).as_ref().to_vec()
+}
+
+const fn is_about_pin(error: &Error) -> bool {
+    use RvError::{PinExpired, PinIncorrect, PinInvalid, PinLenRange, PinLocked};
+    matches!(
+        error,
+        Error::Pkcs11(
+            PinExpired | PinIncorrect | PinInvalid | PinLenRange | PinLocked,
+            _
+        )
+    )
 }
 
 /// The slot of the token.
@@ -123,7 +216,11 @@ fn slot(library: &Pkcs11, uri: &TokenUri) -> Result<Slot, Unusable> {
     let mut found = None;
     for slot in library.get_slots_with_initialized_token()? {
         let token = library.get_token_info(slot)?;
-        if fits(&uri.token, token.label()) && fits(&uri.serial, token.serial_number()) {
+        let is_meant = fits(&uri.token, token.label())
+            && fits(&uri.serial, token.serial_number())
+            && fits(&uri.model, token.model())
+            && fits(&uri.manufacturer, token.manufacturer_id());
+        if is_meant {
             if found.is_some() {
                 return Err("several tokens fit: add `token=LABEL` or `serial=NUMBER`".into());
             }
@@ -209,15 +306,57 @@ fn generate(session: &Session, uri: &TokenUri) -> Result<(), Unusable> {
     ))
 }
 
-impl TokenKey {
-    /// Signs; opens another session once, because the token may have been away.
-    fn sign(&self, message: &[u8]) -> Result<Vec<u8>, Unusable> {
-        let mut open_session = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Ok(signature) = open_session.sign(message) {
-            return Ok(signature);
+impl SigningThread {
+    fn start(mut sign: impl FnMut(&[u8]) -> Signed + Send + 'static) -> Result<Self, Unusable> {
+        let (jobs, received) = sync_channel::<Job>(1);
+        thread::Builder::new()
+            .name("jaus-token".to_owned())
+            .spawn(move || {
+                for Job { message, answer } in received {
+                    // Its caller may have stopped waiting.
+                    let _ = answer.send(sign(&message));
+                }
+            })?;
+        Ok(Self {
+            jobs,
+            late: None,
+            spent: Bucket::default(),
+        })
+    }
+
+    fn sign(&mut self, message: &[u8]) -> Signed {
+        if let Some(late) = &self.late
+            && matches!(late.try_recv(), Err(TryRecvError::Empty))
+        {
+            return Err("it has not answered yet".into());
         }
-        *open_session = open(&self.uri)?;
-        Ok(open_session.sign(message)?)
+        self.late = None;
+        let began = now();
+        if self.spent.debt(began) >= BURST {
+            return Err("it is slow or has failed, and is asked again soon".into());
+        }
+        let signed = self.ask(message);
+        if let Err(Unusable(what)) = &signed {
+            tracing::error!(error = what, "the token of this node's key does not sign");
+            self.spent.spend(now(), BURST + PAUSE);
+        }
+        let taken = now().saturating_duration_since(began);
+        self.spent.spend(now(), SHARE * taken);
+        signed
+    }
+
+    fn ask(&mut self, message: &[u8]) -> Signed {
+        let (answer, answered) = sync_channel(1);
+        let message = message.to_vec();
+        self.jobs.send(Job { message, answer })?;
+        match answered.recv_timeout(LONGEST_WAIT) {
+            Ok(signed) => signed,
+            Err(RecvTimeoutError::Timeout) => {
+                self.late = Some(answered);
+                Err(format!("no answer within {LONGEST_WAIT:?}").into())
+            }
+            Err(error @ RecvTimeoutError::Disconnected) => Err(error.into()),
+        }
     }
 }
 
@@ -236,18 +375,14 @@ impl fmt::Debug for TokenKey {
     }
 }
 
-/// The key, as TLS uses it.
-#[derive(Clone, Debug)]
-struct TokenSigningKey(Arc<TokenKey>);
-
-impl SigningKey for TokenSigningKey {
+impl SigningKey for TokenKey {
     fn choose_scheme(&self, offered: &[SignatureScheme]) -> Option<Box<dyn Signer>> {
         let is_offered = offered.contains(&SignatureScheme::ED25519);
         is_offered.then(|| Box::new(self.clone()) as Box<dyn Signer>)
     }
 
     fn public_key(&self) -> Option<SubjectPublicKeyInfoDer<'_>> {
-        Some(self.0.public.spki())
+        Some(self.public.spki())
     }
 
     fn algorithm(&self) -> SignatureAlgorithm {
@@ -255,12 +390,11 @@ impl SigningKey for TokenSigningKey {
     }
 }
 
-impl Signer for TokenSigningKey {
+impl Signer for TokenKey {
     fn sign(&self, message: &[u8]) -> Result<Vec<u8>, rustls::Error> {
-        self.0.sign(message).map_err(|Unusable(what)| {
-            tracing::error!(error = what, "the token of this node's key does not sign");
-            rustls::Error::General("the token does not sign".to_owned())
-        })
+        let mut signer = self.signer.lock().unwrap_or_else(PoisonError::into_inner);
+        let signed = signer.sign(message);
+        signed.map_err(|Unusable(what)| rustls::Error::General(format!("the token: {what}")))
     }
 
     fn scheme(&self) -> SignatureScheme {

@@ -34,6 +34,18 @@ fn trusting(name: &str, key: &Key, ids: &str) -> TrustFile {
     }]))
 }
 
+/// The link of a rover, and that of a client which dials it.
+fn linked(folder: &tempfile::TempDir) -> (SecureLink, SecureLink) {
+    let keys = ["rover", "client"].map(|name| key(folder, name));
+    let any = "127.0.0.1:0".parse().unwrap();
+    let trust = trusting("client", &keys[1], "60.255.255");
+    let at_rover = SecureLink::open(&keys[0], trust, Settings::new(any)).unwrap();
+    let settings = Settings::new(any).connect(at_rover.local().unwrap());
+    let trust = trusting("rover", &keys[0], "101.255.255");
+    let at_client = SecureLink::open(&keys[1], trust, settings).unwrap();
+    (at_rover, at_client)
+}
+
 fn node(subsystem: u16, link: SecureLink) -> Node {
     let config = Config::new(subsystem, 1).without_udp();
     Node::start_with(config, vec![Box::new(link)]).unwrap()
@@ -55,14 +67,7 @@ fn client(node: &Node) -> Component {
 #[tokio::test]
 async fn a_sensor_is_found_queried_and_subscribed_over_a_secure_link_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
-    let any = "127.0.0.1:0".parse().unwrap();
-    let trust = trusting("client", &client_key, "60.255.255");
-    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
-    let settings = Settings::new(any).connect(at_rover.local().unwrap());
-    let trust = trusting("rover", &rover_key, "101.255.255");
-    let at_client = SecureLink::open(&client_key, trust, settings).unwrap();
-
+    let (at_rover, at_client) = linked(&folder);
     let nodes = [node(101, at_rover), node(60, at_client)];
     let (rover, client) = (sensor(&nodes[0]), client(&nodes[1]));
     let mut report = ReportAccelerationState::default();
@@ -179,14 +184,8 @@ async fn who_comes_first_with_the_id_of_a_peer_on_a_plain_link_gets_none_of_its_
 #[tokio::test]
 async fn a_node_that_is_shut_down_tells_its_peers() {
     let folder = tempfile::tempdir().unwrap();
-    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
-    let any = "127.0.0.1:0".parse().unwrap();
-    let trust = trusting("client", &client_key, "60.255.255");
-    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let (at_rover, mut at_client) = linked(&folder);
     let peers = [at_rover.local().unwrap()];
-    let trust = trusting("rover", &rover_key, "101.255.255");
-    let settings = Settings::new(any).connect(peers[0]);
-    let mut at_client = SecureLink::open(&client_key, trust, settings).unwrap();
     let rover = node(101, at_rover);
     assert!(at_client.probe(&peers, LIMIT).await[0].is_ok());
     rover.shutdown().await;
@@ -205,15 +204,13 @@ async fn a_node_that_is_shut_down_tells_its_peers() {
 #[tokio::test]
 async fn the_counters_of_a_link_are_in_the_reports_of_its_node() {
     let folder = tempfile::tempdir().unwrap();
-    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
-    let stranger_key = key(&folder, "stranger");
-    let any = "127.0.0.1:0".parse().unwrap();
-    let trust = trusting("client", &client_key, "60.255.255");
-    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
+    let (at_rover, _) = linked(&folder);
+    let rover_key = Key::load(&folder.path().join("rover")).unwrap();
+    let stranger = key(&folder, "stranger");
     let peers = [at_rover.local().unwrap()];
+    let settings = Settings::new("127.0.0.1:0".parse().unwrap()).connect(peers[0]);
     let trust = trusting("rover", &rover_key, "101.255.255");
-    let settings = Settings::new(any).connect(peers[0]);
-    let mut at_stranger = SecureLink::open(&stranger_key, trust, settings).unwrap();
+    let mut at_stranger = SecureLink::open(&stranger, trust, settings).unwrap();
     let rover = node(101, at_rover);
     assert!(at_stranger.probe(&peers, LIMIT).await[0].is_err());
     let counted = async {

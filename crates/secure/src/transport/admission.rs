@@ -2,7 +2,7 @@
 //!
 //! The source address of a first packet proves nothing, so there is no budget for it: a forger would
 //! spend the budget of the peer whose address it uses. A few first packets are accepted as they come,
-//! while few handshakes are unfinished. Each further one is answered by a Retry packet (RFC 9000,
+//! while few handshakes are unfinished and the own key is in no token. Each further one is answered by a Retry packet (RFC 9000,
 //! section 8.1), which is shorter than the first packet and leaves no state here. A peer that
 //! returns its token, or one from an earlier session, has proved that it receives at its address.
 //! Only then its address has a budget, and a share of the places for unfinished handshakes.
@@ -102,8 +102,9 @@ impl Transport {
     /// Decides on a new connection from a peer.
     pub(super) fn admit(&mut self, now: Instant, incoming: Incoming) {
         if !incoming.remote_address_validated() {
-            let is_calm =
-                self.admission.unproven.take(now, ()) && self.unfinished().count() < RETRY_FROM;
+            let is_calm = self.admission.unproven.take(now, ())
+                && self.unfinished().count() < RETRY_FROM
+                && !self.credentials.own_key().is_slow();
             return match is_calm {
                 true => self.accept(now, incoming),
                 false => self.request_proof(now, incoming),

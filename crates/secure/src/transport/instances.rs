@@ -5,16 +5,13 @@
 //! program cannot take its place, even with the same key.
 //!
 //! A JAUS id belongs to the instance that has used it last, while that one is alive: the other's
-//! messages from this id are refused, but for a stop, and the owner of the id is sent a ping. If it does
-//! not answer, because it was killed or restarted, its session ends and the id is free.
-//!
-//! Peers before this version send no hello. After [`PATIENCE`] all programs of such a key count as
-//! one: the newer session replaces the older.
+//! messages from this id are refused, but for a stop, and the owner of the id is sent pings. If nothing
+//! comes from it for a second, or for four round trips if that is longer, because it was killed or
+//! restarted, its session ends and the id is free.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
 use jaus::rights::{Permission, Table};
@@ -29,10 +26,11 @@ use crate::key::{self, PublicKey};
 pub(super) const HELLO: u8 = 0xFD;
 /// The octets of an instance.
 const LENGTH: usize = 16;
-/// How long after the handshake the hello of a peer may arrive.
-pub(super) const PATIENCE: Duration = Duration::from_secs(2);
-/// How long the owner of an id has to answer a ping. Round trips are shorter, or the link is no use.
+/// The least time, and the round trips, within which a sign of life of the owner of an id must come.
 const ANSWER: Duration = Duration::from_secs(1);
+const ANSWER_ROUND_TRIPS: u32 = 4;
+/// Pings in that time, while nothing is heard. At a loss of 30 % each way, all fail once in 50 000 times.
+const PINGS: u32 = 16;
 /// A session without a packet for this time gives way to a new one if its key has too many. Peers
 /// send keep-alives every second.
 const SILENCE: Duration = Duration::from_millis(2500);
@@ -48,20 +46,16 @@ const LEASE: Duration = Duration::from_secs(30);
 pub(super) struct Instance([u8; LENGTH]);
 
 impl Instance {
-    /// That of all programs that do not tell theirs.
-    pub(super) const UNNAMED: Self = Self([0; LENGTH]);
-
-    /// A new one; without random numbers the program behaves as one before this version.
+    /// A new one. Without random numbers there are no sessions that it could distinguish.
     pub(super) fn random() -> Self {
-        key::random().map_or(Self::UNNAMED, Self)
+        Self(key::random().unwrap_or_default())
     }
 
     /// The message that tells it to a peer.
-    pub(super) fn hello(self) -> Option<Bytes> {
-        let mut hello = BytesMut::with_capacity(1 + LENGTH);
-        hello.put_u8(HELLO);
-        hello.put_slice(&self.0);
-        (self != Self::UNNAMED).then(|| hello.freeze())
+    pub(super) fn hello(self) -> [u8; 1 + LENGTH] {
+        let mut hello = [HELLO; 1 + LENGTH];
+        hello[1..].copy_from_slice(&self.0);
+        hello
     }
 
     /// Reads a hello. Later versions may append to it.
@@ -69,6 +63,16 @@ impl Instance {
         let (octets, _) = hello.get(1..)?.split_first_chunk()?;
         Some(Self(*octets))
     }
+}
+
+/// A question for a sign of life.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    since: Instant,
+    until: Instant,
+    /// The next ping.
+    next: Instant,
+    pause: Duration,
 }
 
 /// The ids that a session has used, with the time of the last message.
@@ -104,15 +108,16 @@ impl Transport {
     pub(super) fn has_place_for(&mut self, now: Instant, key: PublicKey) -> bool {
         let of_key: Vec<_> = self
             .with_key(key)
-            .map(|(id, it)| (it.heard_at, id))
+            .map(|(id, it)| (it.heard_at, id, SILENCE.max(it.answer_time())))
             .collect();
         if of_key.len() < MOST_INSTANCES {
             return true;
         }
         let longest_silent = of_key.into_iter().min();
-        let silent = longest_silent.filter(|(at, _)| at.is_none_or(|at| at + SILENCE <= now));
-        match silent {
-            Some((_, id)) => {
+        let is_silent =
+            |&(at, _, time): &(Option<Instant>, _, _)| at.is_none_or(|at| at + time <= now);
+        match longest_silent.filter(is_silent) {
+            Some((_, id, _)) => {
                 self.end(now, id, code::DUPLICATE, "too many programs with this key");
                 true
             }
@@ -136,7 +141,7 @@ impl Transport {
             return;
         };
         match (Instance::parse(hello), session.instance) {
-            (Some(told), None | Some(Instance::UNNAMED)) => {
+            (Some(told), None) => {
                 session.instance = Some(told);
                 self.keep_one(now, id);
             }
@@ -175,26 +180,11 @@ impl Transport {
         self.end(now, other, code::DUPLICATE, reason);
     }
 
-    /// Handles peers that have not told their instance, or not answered a ping, in time.
-    pub(super) fn settle_instances(&mut self, now: Instant) {
-        let is_due = |due: Option<Instant>| due.is_some_and(|due| due <= now);
-        let (mut unnamed, mut lost) = (Vec::new(), Vec::new());
-        for (&id, session) in &mut self.sessions {
-            if is_due(session.hello_due()) {
-                session.instance = Some(Instance::UNNAMED);
-                unnamed.push(id);
-            }
-            if is_due(session.answer_due()) {
-                let asked = session.asked.take();
-                if session.heard_at <= asked {
-                    lost.push(id);
-                }
-            }
-        }
-        for id in unnamed {
-            self.keep_one(now, id);
-        }
-        for id in lost {
+    /// Sends the pings that are due, and ends the sessions of programs that have not answered in time.
+    pub(super) fn ping_owners(&mut self, now: Instant) {
+        let sessions = self.sessions.iter_mut();
+        let silent = sessions.filter_map(|(&id, it)| it.has_fallen_silent(now).then_some(id));
+        for id in silent.collect::<Vec<_>>() {
             let reason = "another program with the same key uses its id, and it does not answer";
             self.end(now, id, code::DUPLICATE, reason);
         }
@@ -233,10 +223,7 @@ impl Transport {
         let Some(owner) = self.sessions.get_mut(&owner) else {
             return;
         };
-        if owner.asked.is_none() {
-            owner.asked = Some(now);
-            owner.connection.ping();
-        }
+        owner.ask(now);
         let (name, address) = (self.table.name_of(&frame.payload), owner.address());
         let sentence = format!(
             "{name} from {source} to {destination}: the program at {address} has the same key and uses this \
@@ -253,22 +240,53 @@ impl Transport {
 }
 
 impl Session {
-    /// When its peer counts as one that does not tell its instance.
-    fn hello_due(&self) -> Option<Instant> {
-        let since = self
-            .since
-            .filter(|_| self.instance.is_none() && !self.ended);
-        since.map(|since| since + PATIENCE)
+    /// Notes whether packets have come that QUIC has authenticated: anybody can send others.
+    pub(super) fn note_packets(&mut self, now: Instant) {
+        let frames = self.connection.stats().frame_rx;
+        let frames = frames.acks + frames.ping + frames.datagram + frames.stream;
+        if frames != self.frames {
+            self.frames = frames;
+            self.heard_at = Some(now);
+        }
     }
 
-    /// When its peer has not answered a ping in time.
-    fn answer_due(&self) -> Option<Instant> {
-        let asked = self.asked.filter(|_| !self.ended);
-        asked.map(|asked| asked + ANSWER)
+    /// How long a living peer may be silent that is sent pings.
+    fn answer_time(&self) -> Duration {
+        ANSWER.max(ANSWER_ROUND_TRIPS * self.connection.rtt())
     }
 
-    /// When [`Transport::settle_instances`] is due for it.
-    pub(super) fn settlement_due(&self) -> Option<Instant> {
-        self.hello_due().into_iter().chain(self.answer_due()).min()
+    /// Sends pings until there is a sign of life.
+    fn ask(&mut self, now: Instant) {
+        let time = self.answer_time();
+        self.asked.get_or_insert(Asked {
+            since: now,
+            until: now + time,
+            next: now,
+            pause: time / PINGS,
+        });
+    }
+
+    /// Sends the ping that is due; returns whether there was no sign of life in time.
+    fn has_fallen_silent(&mut self, now: Instant) -> bool {
+        let Some(asked) = self.asked.as_mut().filter(|_| !self.ended) else {
+            return false;
+        };
+        let is_silent = self.heard_at.is_none_or(|at| at <= asked.since);
+        if asked.until <= now {
+            self.asked = None;
+            return is_silent;
+        }
+        if asked.next <= now {
+            asked.next = (now + asked.pause).min(asked.until);
+            if is_silent {
+                self.connection.ping();
+            }
+        }
+        false
+    }
+
+    /// When the next ping is due, or its answer.
+    pub(super) fn ping_due(&self) -> Option<Instant> {
+        self.asked.filter(|_| !self.ended).map(|it| it.next)
     }
 }

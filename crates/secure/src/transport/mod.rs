@@ -222,8 +222,8 @@ impl Transport {
                 if let Some(&id) = self.handles.get(&handle)
                     && let Some(session) = self.sessions.get_mut(&id)
                 {
-                    session.heard_at = Some(now);
                     session.connection.handle_event(event);
+                    session.note_packets(now);
                     self.advance(now, id);
                 }
             }
@@ -239,7 +239,7 @@ impl Transport {
         self.apply_own(now);
         self.apply_trust(now);
         self.remind(now);
-        self.settle_instances(now);
+        self.ping_owners(now);
         self.dial(now);
         let due: Vec<_> = self
             .sessions
@@ -266,13 +266,12 @@ impl Transport {
 
     /// When to call [`handle_timeout`](Self::handle_timeout) if nothing happens before.
     pub fn poll_timeout(&mut self) -> Option<Instant> {
-        let settlements = self.sessions.values().filter_map(Session::settlement_due);
-        let settlement = settlements.min();
+        let ping = self.sessions.values().filter_map(Session::ping_due).min();
         let sessions = self.sessions.values_mut();
         let sessions = sessions.filter_map(|it| it.connection.poll_timeout());
         let dials = self.dials.iter().filter_map(Dial::due);
         let budget = self.budget.as_ref().and_then(Budget::ready);
-        sessions.chain(dials).chain(budget).chain(settlement).min()
+        sessions.chain(dials).chain(budget).chain(ping).min()
     }
 
     /// Closes all sessions and dials no more; returns whether there is a peer to tell.
@@ -324,14 +323,14 @@ impl Transport {
                 Event::Connected if session.dial.is_some() => session.greet(self.instance),
                 Event::Connected => self.establish(now, id),
                 Event::ConnectionLost { reason } => self.lose(now, id, &reason),
-                Event::DatagramReceived => self.read_datagrams(now, id),
+                Event::DatagramReceived => self.read(now, id, None),
                 Event::Stream(StreamEvent::Opened { .. }) => {
                     for stream in session.accept_streams() {
-                        self.read_stream(now, id, stream);
+                        self.read(now, id, Some(stream));
                     }
                 }
                 Event::Stream(StreamEvent::Readable { id: stream }) => {
-                    self.read_stream(now, id, stream);
+                    self.read(now, id, Some(stream));
                 }
                 // The next flush tries every stream and datagram again.
                 Event::HandshakeDataReady | Event::DatagramsUnblocked | Event::Stream(_) => {}
@@ -371,7 +370,6 @@ impl Transport {
         let (peer, address) = (identified.peer, session.address());
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
-        session.since = Some(now);
         session.valid_until = identified.valid_until;
         self.counters.add(Counter::SessionsEstablished);
         match session.dial {

@@ -16,7 +16,7 @@ use quinn_proto::{Connection, ConnectionHandle, Dir, SendDatagramError, StreamId
 use rustls::pki_types::{CertificateDer, UnixTime};
 
 use super::inlet::{Inlet, framed};
-use super::instances::{Instance, UsedIds};
+use super::instances::{Asked, Instance, UsedIds};
 use super::zone;
 use crate::authority::Rejection;
 use crate::credentials::Identified;
@@ -40,16 +40,16 @@ pub(super) struct Session {
     pub(super) dial: Option<usize>,
     /// The peer, after the handshake.
     pub(super) peer: Option<Peer>,
-    /// Since when it is known.
-    pub(super) since: Option<Instant>,
     /// Which of the programs with its key it is, once it has told.
     pub(super) instance: Option<Instance>,
     /// The ids that it uses.
     pub(super) used: UsedIds,
-    /// When the latest packet came.
+    /// When the latest packet of the peer came.
     pub(super) heard_at: Option<Instant>,
-    /// When it was asked for a sign of life, until that is settled.
-    pub(super) asked: Option<Instant>,
+    /// The frames of its packets so far.
+    pub(super) frames: u64,
+    /// The question for a sign of life, until that is settled.
+    pub(super) asked: Option<Asked>,
     /// Until when its certificate is valid, if it has one.
     pub(super) valid_until: Option<UnixTime>,
     /// Whether it has ended and only waits for late packets of the peer.
@@ -86,10 +86,10 @@ impl Session {
             connection,
             dial,
             peer: None,
-            since: None,
             instance: None,
             used: UsedIds::default(),
             heard_at: None,
+            frames: 0,
             asked: None,
             valid_until: None,
             ended: false,
@@ -155,10 +155,8 @@ impl Session {
         if self.dial.is_none() {
             self.write(level, &[]);
         }
-        if let Some(hello) = own.hello() {
-            // The first octets of a stream are never held up.
-            self.write(level, &hello);
-        }
+        // The first octets of a stream are never held up.
+        self.write(level, &own.hello());
     }
 
     /// The priority of the datagram that waits next.

@@ -35,6 +35,15 @@ struct Host {
     spoken: Vec<JausId>,
 }
 
+/// The link of a host: a delay each way, and the share of datagrams that are lost, in percent.
+#[derive(Clone, Copy)]
+struct Far {
+    address: SocketAddr,
+    delay: Duration,
+    loss: u64,
+    seed: u64,
+}
+
 /// Hosts that exchange UDP datagrams.
 struct Network {
     now: Instant,
@@ -44,8 +53,18 @@ struct Network {
     number: u64,
     /// One of so many datagrams is lost; 0 for none.
     loss: u64,
+    /// A host with a link of its own.
+    far: Option<Far>,
     /// Everything that was sent.
     record: Vec<(SocketAddr, SocketAddr, Bytes)>,
+}
+
+/// A number without pattern (SplitMix64).
+const fn noise(number: u64) -> u64 {
+    let mixed = number.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    mixed ^ (mixed >> 31)
 }
 
 fn key() -> Key {
@@ -78,6 +97,7 @@ impl Network {
             wire: BTreeMap::new(),
             number: 0,
             loss: 0,
+            far: None,
             record: Vec::new(),
         }
     }
@@ -106,8 +126,15 @@ impl Network {
             {
                 self.number += 1;
                 self.record.push((to, host.address, octets.clone()));
-                if self.loss == 0 || !self.number.is_multiple_of(self.loss) {
-                    let key = (self.now + DELAY, self.number);
+                let far = self
+                    .far
+                    .filter(|it| [to, host.address].contains(&it.address));
+                let is_lost = match far {
+                    Some(far) => noise(far.seed + self.number) % 100 < far.loss,
+                    None => self.loss != 0 && self.number.is_multiple_of(self.loss),
+                };
+                if !is_lost {
+                    let key = (self.now + far.map_or(DELAY, |it| it.delay), self.number);
                     self.wire.insert(key, (to, host.address, octets));
                 }
             }
@@ -163,6 +190,11 @@ impl Network {
         self.hosts[host].transport.send(session, priority, datagram);
     }
 
+    fn send_to_all(&mut self, host: usize, datagram: &Bytes) {
+        let transport = &mut self.hosts[host].transport;
+        transport.send_to_all(Priority::Standard, datagram);
+    }
+
     fn count(&self, host: usize, counter: Counter) -> u64 {
         self.hosts[host].transport.counters().get(counter)
     }
@@ -170,13 +202,17 @@ impl Network {
 
 /// A JUDP datagram with one message to everyone.
 fn judp(source: &str, octets: usize) -> Bytes {
-    let payload = vec![7; octets].into();
-    let source = source.parse().unwrap();
-    judp::encode(&Frame::new(source, JausId::EVERYONE, payload)).unwrap()
+    raw(source, &JausId::EVERYONE.to_string(), &vec![7; octets])
 }
 
-/// A fragment of a large message, which has to arrive.
-/// A fragment of a message that begins with the number 0.
+/// A JUDP datagram with one message.
+fn raw(source: &str, destination: &str, message: &[u8]) -> Bytes {
+    let (source, destination) = (source.parse().unwrap(), destination.parse().unwrap());
+    let frame = Frame::new(source, destination, Bytes::copy_from_slice(message));
+    judp::encode(&frame).unwrap()
+}
+
+/// A fragment of a large message, which has to arrive and begins with the number 0.
 fn fragment(source: &str, number: u16) -> Bytes {
     let mut frame = Frame::new(
         source.parse().unwrap(),
@@ -193,18 +229,38 @@ fn fragment(source: &str, number: u16) -> Bytes {
 
 const SECOND: Duration = Duration::from_secs(1);
 
+/// Nodes with these credentials, the second of which has dialled the first.
+fn connected(credentials: &[Credentials; 2]) -> Network {
+    let mut network = Network::new();
+    network.add_with(credentials[0].clone(), &[]);
+    network.add_with(credentials[1].clone(), &[address(1)]);
+    network.run(SECOND);
+    network
+}
+
+/// What a vehicle, 101, and an operator, 60, with these keys trust.
+fn mutual(keys: &[Key; 2]) -> [TrustFile; 2] {
+    [
+        trusting([peer("operator", &keys[1], "60.255.255")]),
+        trusting([peer("rover", &keys[0], "101.255.255")]),
+    ]
+}
+
+fn pinned(keys: &[Key; 2], trust: &[TrustFile; 2]) -> [Credentials; 2] {
+    [0, 1].map(|it| Credentials::pinned(keys[it].clone(), trust[it].clone()))
+}
+
 /// A vehicle, 101, that listens, and an operator, 60, that dials it.
 fn vehicle_and_operator() -> (Network, [TrustFile; 2], [Key; 2]) {
     let keys = [key(), key()];
-    let trust = [
-        trusting([peer("operator", &keys[1], "60.255.255")]),
-        trusting([peer("rover", &keys[0], "101.255.255")]),
-    ];
-    let mut network = Network::new();
-    network.add(&keys[0], &trust[0], &[]);
-    network.add(&keys[1], &trust[1], &[address(1)]);
-    network.run(SECOND);
-    (network, trust, keys)
+    let trust = mutual(&keys);
+    (connected(&pinned(&keys, &trust)), trust, keys)
+}
+
+/// The sessions of a host.
+fn sessions(network: &Network, host: usize) -> Vec<SessionId> {
+    let sessions = network.hosts[host].transport.sessions();
+    sessions.map(|it| it.session).collect()
 }
 
 #[test]
@@ -357,10 +413,7 @@ fn an_urgent_message_overtakes_a_large_one() {
 #[test]
 fn of_two_sessions_between_the_same_nodes_one_stays() {
     let keys = [key(), key()];
-    let trust = [
-        trusting([peer("operator", &keys[1], "60.255.255")]),
-        trusting([peer("rover", &keys[0], "101.255.255")]),
-    ];
+    let trust = mutual(&keys);
     let mut network = Network::new();
     network.add(&keys[0], &trust[0], &[address(2)]);
     network.add(&keys[1], &trust[1], &[address(1)]);

@@ -103,24 +103,17 @@ impl Transport {
         self.is_refusing = is_refusing;
     }
 
-    /// Reads the QUIC datagrams of a session.
-    pub(super) fn read_datagrams(&mut self, now: Instant, id: SessionId) {
-        let mut datagrams = Vec::new();
-        if let Some(session) = self.sessions.get_mut(&id) {
-            datagrams.extend(std::iter::from_fn(|| session.connection.datagrams().recv()));
+    /// Reads a stream of a session; without one, its QUIC datagrams.
+    pub(super) fn read(&mut self, now: Instant, id: SessionId, stream: Option<StreamId>) {
+        let Some(session) = self.sessions.get_mut(&id) else {
+            return;
+        };
+        let mut received = Vec::new();
+        match stream {
+            Some(stream) => session.read(stream, |it| received.push(it)),
+            None => received.extend(std::iter::from_fn(|| session.connection.datagrams().recv())),
         }
-        for datagram in datagrams {
-            self.receive(now, id, &datagram);
-        }
-    }
-
-    /// Reads a stream of a session.
-    pub(super) fn read_stream(&mut self, now: Instant, id: SessionId, stream: StreamId) {
-        let mut datagrams = Vec::new();
-        if let Some(session) = self.sessions.get_mut(&id) {
-            session.read(stream, |datagram| datagrams.push(datagram));
-        }
-        for datagram in datagrams {
+        for datagram in received {
             self.receive(now, id, &datagram);
         }
     }

@@ -34,8 +34,10 @@ impl Readers {
 pub fn read(path: &Path, readers: Readers, longest: u64) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     check(path, &file, readers)?;
-    let mut octets = Vec::new();
-    // A pipe, such as `<(pass show token)` of a shell, has no length beforehand.
+    // As large as needed, for growth would leave copies of a secret in memory. A pipe, such as
+    // `<(pass show token)` of a shell, has no length beforehand.
+    let length = file.metadata()?.len().min(longest) + 1;
+    let mut octets = Vec::with_capacity(usize::try_from(length).unwrap_or_default());
     file.take(longest + 1).read_to_end(&mut octets)?;
     if octets.len() as u64 > longest {
         let text = format!("it is longer than {longest} octets");

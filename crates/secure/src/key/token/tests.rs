@@ -135,6 +135,72 @@ fn what_is_wrong_with_a_token_is_named() {
     token.run("another_token_is_named", "token=other;object=node");
     fs::write(token.folder.path().join("pin"), "654321\n").unwrap();
     token.run("a_wrong_pin_is_named", "token=rover;object=node");
+    token.run("a_wrong_pin_is_tried_once", "token=rover;object=node");
+}
+
+#[test]
+#[ignore = "run by another test with a token"]
+fn a_wrong_pin_is_tried_once() {
+    let error = || Key::load(&uri()).unwrap_err().to_string();
+    let first = error();
+    assert!(first.contains("with the PIN in"), "{first}");
+    for _ in 0..5 {
+        assert!(error().contains("not tried again until that file changes"));
+    }
+    let file = TokenUri::parse(uri().to_str().unwrap())
+        .unwrap()
+        .pin
+        .unwrap();
+    fs::write(file, "123456\n").unwrap();
+    assert!(error().contains("no such Ed25519 key"), "{}", error());
+}
+
+#[test]
+fn a_token_that_fails_is_not_asked_again_at_once() {
+    let mut asked = 0;
+    let mut thread = SigningThread::start(move |_| {
+        asked += 1;
+        Err(format!("failure {asked}").into())
+    })
+    .unwrap();
+    let errors: Vec<_> = (0..100).map(|_| thread.sign(b"a").unwrap_err().0).collect();
+    assert_eq!(errors[0], "failure 1");
+    assert!(errors[1..].iter().all(|it| it.contains("again soon")));
+}
+
+#[test]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "waits for a thread, in real time"
+)]
+fn a_token_that_does_not_answer_is_waited_for_once() {
+    let (answer, answers) = sync_channel::<()>(0);
+    let asked = Arc::new(Mutex::new(0));
+    let count = asked.clone();
+    let mut thread = SigningThread::start(move |message| {
+        *count.lock().unwrap() += 1;
+        answers.recv()?;
+        Ok(message.to_vec())
+    })
+    .unwrap();
+    let Unusable(error) = thread.sign(b"first").unwrap_err();
+    assert!(error.contains("no answer within"), "{error}");
+    for _ in 0..100 {
+        assert!(thread.sign(b"another").is_err());
+    }
+    assert_eq!(*asked.lock().unwrap(), 1);
+    // It comes back.
+    answer.send(()).unwrap();
+    let signed = thread::spawn(move || {
+        loop {
+            if let Ok(signed) = thread.sign(b"last") {
+                return signed;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    });
+    answer.send(()).unwrap();
+    assert_eq!(signed.join().unwrap(), b"last");
 }
 
 #[test]

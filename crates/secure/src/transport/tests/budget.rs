@@ -42,13 +42,9 @@ fn all_sessions_together_send_no_more_than_the_budget_and_use_it() {
     let start = network.record.len();
     for number in 0..1000 {
         for peer in ["operator", "observer"] {
-            send(
-                &mut network,
-                peer,
-                Priority::Low,
-                &fragment("101.1.33", number),
-            );
-            send(&mut network, peer, Priority::Low, &judp("101.1.33", 200));
+            for datagram in [fragment("101.1.33", number), judp("101.1.33", 200)] {
+                send(&mut network, peer, Priority::Low, &datagram);
+            }
         }
     }
     let seconds = 10;
@@ -65,12 +61,8 @@ fn all_sessions_together_send_no_more_than_the_budget_and_use_it() {
 fn what_is_urgent_overtakes_what_waits_for_the_budget_in_any_session() {
     let mut network = vehicle_with_budget();
     for number in 0..500 {
-        send(
-            &mut network,
-            "operator",
-            Priority::Low,
-            &fragment("101.1.33", number),
-        );
+        let fragment = fragment("101.1.33", number);
+        send(&mut network, "operator", Priority::Low, &fragment);
     }
     network.run(SECOND);
     let urgent = judp("101.1.33", 20);
@@ -90,27 +82,14 @@ fn what_is_urgent_overtakes_what_waits_for_the_budget_in_any_session() {
 #[test]
 fn a_session_lives_while_its_budget_is_used_up() {
     let mut network = vehicle_with_budget();
-    let before: Vec<_> = network.hosts[0]
-        .transport
-        .sessions()
-        .map(|it| it.session)
-        .collect();
+    let before = sessions(&network, 0);
     for round in 0..60 {
         for number in 0..200 {
-            send(
-                &mut network,
-                "operator",
-                Priority::Standard,
-                &fragment("101.1.33", round * 200 + number),
-            );
+            let fragment = fragment("101.1.33", round * 200 + number);
+            send(&mut network, "operator", Priority::Standard, &fragment);
         }
         network.run(SECOND);
     }
-    let after: Vec<_> = network.hosts[0]
-        .transport
-        .sessions()
-        .map(|it| it.session)
-        .collect();
-    assert_eq!(after, before);
+    assert_eq!(sessions(&network, 0), before);
     assert!(network.hosts.iter().all(|it| it.closed.is_empty()));
 }

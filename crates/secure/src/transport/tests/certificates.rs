@@ -69,29 +69,29 @@ impl Team {
         Credentials::load_certified(&key, &self.files(name), trust.clone(), at(now))
     }
 
+    fn error(&self, name: &str, now: u64) -> String {
+        self.load(name, &trusting([]), now).unwrap_err().to_string()
+    }
+
     fn node(&self, name: &str, ids: &str) -> Credentials {
         self.issue(name, ids, 30, NOW);
         self.load(name, &trusting([]), NOW).unwrap()
+    }
+
+    fn nodes(&self) -> [Credentials; 2] {
+        [
+            self.node("rover", "101.255.255"),
+            self.node("operator", "60.255.255"),
+        ]
     }
 }
 
 /// A vehicle, 101, that listens, and an operator, 60, that dials it.
 fn certified() -> (Network, Team, [Credentials; 2]) {
     let team = Team::new();
-    let credentials = [
-        team.node("rover", "101.255.255"),
-        team.node("operator", "60.255.255"),
-    ];
+    let credentials = team.nodes();
     let network = connected(&credentials);
     (network, team, credentials)
-}
-
-fn connected(credentials: &[Credentials; 2]) -> Network {
-    let mut network = Network::new();
-    network.add_with(credentials[0].clone(), &[]);
-    network.add_with(credentials[1].clone(), &[address(1)]);
-    network.run(SECOND);
-    network
 }
 
 fn assert_no_session(network: &Network) {
@@ -101,8 +101,7 @@ fn assert_no_session(network: &Network) {
 /// What a peer that may observe may send.
 fn query(source: &str) -> Bytes {
     let query = QueryHeartbeatPulse {}.encode().unwrap();
-    let (source, destination) = (source.parse().unwrap(), JausId::new(101, 1, 1));
-    judp::encode(&Frame::new(source, destination, query)).unwrap()
+    raw(source, "101.1.1", &query)
 }
 
 #[test]
@@ -118,11 +117,8 @@ fn nodes_with_certificates_of_one_authority_need_no_trust_file() {
     network.run(SECOND);
     assert_eq!(network.hosts[0].received, [own]);
     assert_eq!(network.count(0, Counter::ForeignIds), 1);
-    assert_eq!(
-        network.count(0, Counter::RuleForbids),
-        1,
-        "it may observe only"
-    );
+    // It may observe only.
+    assert_eq!(network.count(0, Counter::RuleForbids), 1);
 }
 
 #[test]
@@ -192,11 +188,7 @@ fn a_session_ends_when_the_certificate_expires_and_the_new_one_continues() {
 #[test]
 fn a_clock_that_is_off_by_a_year_refuses_and_recovers_when_it_is_set() {
     for wrong in [NOW - 365 * DAY, NOW + 365 * DAY] {
-        let team = Team::new();
-        let credentials = [
-            team.node("rover", "101.255.255"),
-            team.node("operator", "60.255.255"),
-        ];
+        let credentials = Team::new().nodes();
         credentials[0].set_clock(at(wrong));
         let mut network = connected(&credentials);
         network.run(5 * SECOND);
@@ -218,11 +210,8 @@ fn another_authority_is_refused_by_both_sides() {
     network.run(5 * SECOND);
     assert_no_session(&network);
     assert!(network.count(1, Counter::RefusedCertificates) > 0);
-    assert_eq!(
-        network.count(0, Counter::SessionsEstablished)
-            + network.count(1, Counter::SessionsEstablished),
-        0
-    );
+    let sessions = [0, 1].map(|host| network.count(host, Counter::SessionsEstablished));
+    assert_eq!(sessions, [0, 0]);
 }
 
 #[test]
@@ -250,10 +239,7 @@ fn the_certificate_of_another_key_cannot_be_used() {
     team.issue("thief", "66.255.255", 30, NOW);
     // The node itself notices it.
     fs::copy(team.path("rover.crt"), team.path("thief.crt")).unwrap();
-    let error = team
-        .load("thief", &trusting([]), NOW)
-        .unwrap_err()
-        .to_string();
+    let error = team.error("thief", NOW);
     assert!(error.contains("another key"), "{error}");
 
     // A thief's own program would not; the signature of the handshake shows it.
@@ -275,17 +261,11 @@ fn an_own_certificate_that_is_not_valid_is_an_error_that_says_what_to_do() {
         (NOW + 31 * DAY, ["has expired", "jaus keys ca issue"]),
         (NOW - 365 * DAY, ["is valid from", "set the clock"]),
     ] {
-        let error = team
-            .load("rover", &trusting([]), now)
-            .unwrap_err()
-            .to_string();
+        let error = team.error("rover", now);
         assert!(words.iter().all(|it| error.contains(it)), "{error}");
     }
     team.authority.revoke("rover", at(NOW)).unwrap();
-    let error = team
-        .load("rover", &trusting([]), NOW)
-        .unwrap_err()
-        .to_string();
+    let error = team.error("rover", NOW);
     assert!(error.contains("is revoked"), "{error}");
 }
 
@@ -321,10 +301,7 @@ fn a_pinned_key_is_replaced_and_the_link_is_back_within_a_second() {
         let folder = tempfile::tempdir().unwrap();
         let paths = ["rover.key", "operator.key"].map(|it| folder.path().join(it));
         let keys = paths.each_ref().map(|it| Key::create(it).unwrap());
-        let trust = [
-            trusting([peer("operator", &keys[1], "60.255.255")]),
-            trusting([peer("rover", &keys[0], "101.255.255")]),
-        ];
+        let trust = mutual(&keys);
         let load = |host: usize| Credentials::load(&paths[host], trust[host].clone()).unwrap();
         let credentials = [load(0), load(1)];
         let mut network = connected(&credentials);
@@ -337,11 +314,8 @@ fn a_pinned_key_is_replaced_and_the_link_is_back_within_a_second() {
         let other = 1 - rotating;
         trust[other].replace(Trust::new(vec![old, new.clone()]));
         network.run(2 * SECOND);
-        assert_eq!(
-            network.count(other, Counter::SessionsEstablished),
-            1,
-            "the session stays"
-        );
+        let established = network.count(other, Counter::SessionsEstablished);
+        assert_eq!(established, 1, "the session stays");
 
         Key::replace_by_next(&paths[rotating]).unwrap();
         credentials[rotating].reload().unwrap();
@@ -349,11 +323,8 @@ fn a_pinned_key_is_replaced_and_the_link_is_back_within_a_second() {
         assert_eq!(network.session(other).unwrap().peer.key, next.public());
         trust[other].replace(Trust::new(vec![new]));
         network.run(2 * SECOND);
-        assert_eq!(
-            network.count(other, Counter::SessionsEstablished),
-            2,
-            "the session stays"
-        );
+        let established = network.count(other, Counter::SessionsEstablished);
+        assert_eq!(established, 2, "the session stays");
         assert_eq!(network.session(other).unwrap().peer.name, name);
     }
 }

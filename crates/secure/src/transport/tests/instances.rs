@@ -1,6 +1,6 @@
 //! Several programs with one key, in virtual time.
 
-use super::super::instances::{Instance, MOST_INSTANCES, PATIENCE};
+use super::super::instances::MOST_INSTANCES;
 use super::*;
 
 /// A vehicle, and this many programs of one operator's host that have dialled it.
@@ -11,11 +11,6 @@ fn vehicle_and_programs(programs: usize) -> (Network, TrustFile, Key) {
     }
     network.run(SECOND);
     (network, rover, operator)
-}
-
-fn sessions(network: &Network, host: usize) -> Vec<SessionId> {
-    let sessions = network.hosts[host].transport.sessions();
-    sessions.map(|it| it.session).collect()
 }
 
 /// Kills a program: without a farewell, and nothing is left at its address.
@@ -80,11 +75,8 @@ fn an_id_remains_with_the_living_program_that_uses_it() {
 fn a_stop_passes_from_an_id_that_another_program_uses() {
     let (mut network, ..) = vehicle_and_programs(2);
     let report = judp("101.1.33", 20);
-    let raw = |payload: &'static [u8]| {
-        let (source, vehicle) = (JausId::new(60, 1, 1), JausId::new(101, 1, 1));
-        judp::encode(&Frame::new(source, vehicle, Bytes::from_static(payload))).unwrap()
-    };
-    let (stop, release) = (raw(b"\x06\0\x01\0"), raw(b"\x0E\0"));
+    let from_operator = |message| raw("60.1.1", "101.1.1", message);
+    let (stop, release) = (from_operator(b"\x06\0\x01\0"), from_operator(b"\x0E\0"));
     let hold = judp("60.1.1", 20);
     network.send(1, Priority::Standard, &hold);
     network.run(SECOND);
@@ -128,6 +120,95 @@ fn a_program_that_was_killed_and_started_again_has_its_id_within_two_seconds() {
     assert!(network.hosts[2].closed.is_empty());
 }
 
+/// A vehicle and two programs, the first of which has used an id; it is far away now, and both sides
+/// have measured that.
+fn vehicle_and_far_program(delay: Duration, seed: u64) -> Network {
+    let (mut network, ..) = vehicle_and_programs(2);
+    network.far = Some(Far {
+        address: address(2),
+        delay,
+        loss: 0,
+        seed: seed << 32,
+    });
+    for _ in 0..20 {
+        network.send(1, Priority::Standard, &judp("60.1.1", 20));
+        network.run(SECOND);
+    }
+    if let Some(far) = &mut network.far {
+        far.loss = 30;
+    }
+    network
+}
+
+/// The links on which a program must keep its id: delays each way.
+const FAR: [Duration; 3] = [
+    DELAY,
+    Duration::from_millis(150),
+    Duration::from_millis(750),
+];
+
+#[test]
+fn a_living_program_keeps_its_session_though_three_of_ten_packets_are_lost() {
+    for (delay, seed) in FAR
+        .into_iter()
+        .flat_map(|it| [1, 2, 3, 4].map(|seed| (it, seed)))
+    {
+        let mut network = vehicle_and_far_program(delay, seed);
+        let before = sessions(&network, 0);
+        for round in 0..60 {
+            if round % 20 == 0 {
+                network.send(1, Priority::Standard, &judp("60.1.1", 20));
+            }
+            network.send(2, Priority::Standard, &judp("60.1.1", 30));
+            network.run(SECOND / 2);
+        }
+        let disputed = network.count(0, Counter::DisputedIds);
+        assert_eq!(sessions(&network, 0), before, "{delay:?}, seed {seed}");
+        assert!(disputed > 50, "{delay:?}, seed {seed}: {disputed}");
+    }
+}
+
+#[test]
+fn a_killed_program_loses_its_id_within_four_round_trips_or_a_second() {
+    for (delay, seed) in FAR.into_iter().flat_map(|it| [1, 2].map(|seed| (it, seed))) {
+        let mut network = vehicle_and_far_program(delay, seed);
+        let reports = network.hosts[0].transport.sessions();
+        let round_trip = reports.map(|it| it.round_trip).max().unwrap();
+        kill(&mut network, 1);
+        network.run(delay);
+        let began = network.now;
+        let new = judp("60.1.1", 30);
+        while !network.hosts[0].received.contains(&new) {
+            network.send(2, Priority::Standard, &new);
+            network.run(SECOND / 20);
+        }
+        let taken = network.now - began;
+        let limit = SECOND.max(4 * round_trip) + SECOND / 5;
+        assert!(taken <= limit, "{delay:?}: {taken:?} of {limit:?}");
+    }
+}
+
+#[test]
+fn forged_packets_do_not_keep_the_id_of_a_killed_program() {
+    let (mut network, ..) = vehicle_and_programs(2);
+    network.send(1, Priority::Standard, &judp("60.1.1", 20));
+    network.run(SECOND);
+    let mut sent = network.record.iter().rev();
+    let genuine = sent.find(|(to, from, _)| (*to, *from) == (address(1), address(2)));
+    let (to, from, genuine) = genuine.unwrap().clone();
+    let mut forged = genuine.to_vec();
+    *forged.last_mut().unwrap() ^= 1;
+    kill(&mut network, 1);
+    let new = judp("60.1.1", 30);
+    for _ in 0..20 {
+        network.deliver(to, from, &genuine);
+        network.deliver(to, from, &forged);
+        network.send(2, Priority::Standard, &new);
+        network.run(SECOND / 10);
+    }
+    assert!(network.hosts[0].received.contains(&new));
+}
+
 #[test]
 fn an_id_that_is_no_longer_used_is_free() {
     let (mut network, ..) = vehicle_and_programs(2);
@@ -138,39 +219,6 @@ fn an_id_that_is_no_longer_used_is_free() {
     network.run(SECOND);
     assert!(network.hosts[0].received.contains(&datagram));
     assert_eq!(sessions(&network, 0).len(), 2);
-}
-
-#[test]
-fn programs_before_this_version_replace_each_other_alone() {
-    let (mut network, rover, operator) = vehicle_and_programs(1);
-    network.run(PATIENCE);
-    for _ in 0..2 {
-        let mut old = Transport::new(&operator, rover.clone(), [address(1)]);
-        old.instance = Instance::UNNAMED;
-        let host = network.add(&operator, &rover, &[]);
-        network.hosts[host].transport = old;
-        network.run(SECOND / 10);
-        assert!(network.session(host).is_some(), "at once");
-        network.run(PATIENCE);
-        assert_eq!(sessions(&network, 0).len(), 2);
-        kill(&mut network, host);
-    }
-    assert!(network.hosts[1].closed.is_empty());
-    assert_eq!(network.hosts[0].closed.len(), 1);
-}
-
-#[test]
-fn a_program_before_this_version_accepts_those_that_tell_their_instance() {
-    let (mut network, trust, keys) = vehicle_and_operator();
-    let mut old = Transport::new(&keys[0], trust[0].clone(), []);
-    old.instance = Instance::UNNAMED;
-    network.hosts[0].transport = old;
-    network.run(10 * SECOND);
-    let datagram = judp("101.1.33", 20);
-    network.send(0, Priority::Standard, &datagram);
-    network.run(10 * SECOND);
-    assert_eq!(network.hosts[1].received, [datagram]);
-    assert_eq!(network.count(0, Counter::SessionsEstablished), 1);
 }
 
 #[test]

@@ -13,19 +13,8 @@ const LIBRARIES: [fn() -> CryptoProvider; 2] =
 /// A vehicle and an operator with TLS of these libraries, after a second.
 fn with_libraries(vehicle: CryptoProvider, operator: CryptoProvider) -> Network {
     let keys = [key(), key()];
-    let trust = [
-        trusting([peer("operator", &keys[1], "60.255.255")]),
-        trusting([peer("rover", &keys[0], "101.255.255")]),
-    ];
-    let [at_vehicle, at_operator] = [0, 1].map(|it| {
-        let (key, trust) = (keys[it].clone(), trust[it].clone());
-        Credentials::pinned(key, trust)
-    });
-    let mut network = Network::new();
-    network.add_with(at_vehicle.with_provider(vehicle), &[]);
-    network.add_with(at_operator.with_provider(operator), &[address(1)]);
-    network.run(SECOND);
-    network
+    let [one, other] = pinned(&keys, &mutual(&keys));
+    connected(&[one.with_provider(vehicle), other.with_provider(operator)])
 }
 
 #[test]
@@ -67,7 +56,9 @@ fn a_key_made_with_one_library_is_read_by_the_other() {
     let made_by_aws_lc = {
         let random = ::aws_lc_rs::rand::SystemRandom::new();
         let document = ::aws_lc_rs::signature::Ed25519KeyPair::generate_pkcs8(&random).unwrap();
-        crate::key::pem("PRIVATE KEY", document.as_ref()).into_bytes()
+        crate::key::pem("PRIVATE KEY", document.as_ref())
+            .as_bytes()
+            .to_vec()
     };
     for pem in [made_by_ring, made_by_aws_lc] {
         let [first, second] = LIBRARIES.map(|library| {

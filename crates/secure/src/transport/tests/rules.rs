@@ -27,9 +27,14 @@ fn replace_rules(trust: &TrustFile, operator: &Key, rules: &str) {
 }
 
 fn message(source: &str, destination: &str, message: &impl jaus::codec::Message) -> Bytes {
-    let (source, destination) = (source.parse().unwrap(), destination.parse().unwrap());
-    let payload = message.encode().unwrap();
-    judp::encode(&Frame::new(source, destination, payload)).unwrap()
+    raw(source, destination, &message.encode().unwrap())
+}
+
+impl Network {
+    /// Lets a host send a message to whom it has a session with.
+    fn say(&mut self, host: usize, from: &str, to: &str, sent: &impl jaus::codec::Message) {
+        self.send(host, Priority::Standard, &message(from, to, sent));
+    }
 }
 
 fn records(network: &mut Network, host: usize) -> Vec<Act> {
@@ -59,11 +64,8 @@ fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
     network.run(SECOND);
     assert_eq!(network.hosts[0].received, [stop]);
     assert_eq!(network.count(0, Counter::RuleForbids), 2);
-    assert_eq!(
-        network.count(1, Counter::NoticesReceived),
-        1,
-        "one a second"
-    );
+    let notices = network.count(1, Counter::NoticesReceived);
+    assert_eq!(notices, 1, "one a second");
     let recorded = decisions(&mut network, 0);
     let refused = |it: &&Decision| it.is_refusal() && it.what == "SetWrenchEffort";
     assert_eq!(recorded.iter().filter(refused).count(), 2);
@@ -140,17 +142,9 @@ fn control_emergencies_and_sessions_are_recorded() {
     let (mut network, ..) = vehicle_with_rules("control=127");
     let request = message("60.1.1", "101.1.1", &RequestControl { authority_code: 1 });
     network.send(1, Priority::Standard, &request);
-    network.send(
-        1,
-        Priority::Standard,
-        &message("60.1.1", "101.1.1", &SetEmergency::default()),
-    );
+    network.say(1, "60.1.1", "101.1.1", &SetEmergency::default());
     network.run(SECOND);
-    network.send(
-        0,
-        Priority::Standard,
-        &message("101.1.1", "60.1.1", &ConfirmControl::default()),
-    );
+    network.say(0, "101.1.1", "60.1.1", &ConfirmControl::default());
     network.run(SECOND);
     let acts = records(&mut network, 0);
     assert_eq!(acts[0], Act::Connected);
@@ -196,9 +190,7 @@ fn relay() -> Network {
 fn pass_on(network: &mut Network) {
     network.run(SECOND);
     for datagram in std::mem::take(&mut network.hosts[0].received) {
-        network.hosts[0]
-            .transport
-            .send_to_all(Priority::Standard, &datagram);
+        network.send_to_all(0, &datagram);
     }
     network.run(SECOND);
 }
@@ -210,11 +202,7 @@ fn a_relay_separates_vehicles_and_operators_by_its_rules() {
     let hello = message("61.1.1", "65535.255.255", &QueryIdentification::default());
     network.send(1, Priority::Standard, &heartbeat);
     network.send(3, Priority::Standard, &hello);
-    network.send(
-        3,
-        Priority::Standard,
-        &message("61.1.1", "102.1.1", &SetEmergency::default()),
-    );
+    network.say(3, "61.1.1", "102.1.1", &SetEmergency::default());
     pass_on(&mut network);
     let received = |host: usize| network.hosts[host].received.clone();
     // Each gets its own broadcast back too; a router does not send there.
@@ -225,22 +213,15 @@ fn a_relay_separates_vehicles_and_operators_by_its_rules() {
     );
     assert_eq!(received(3), [heartbeat]);
     assert!(received(4).is_empty(), "Bert may reach the truck alone");
-    assert_eq!(
-        network.count(0, Counter::RuleForbids),
-        1,
-        "Anna's message to the truck"
-    );
+    // Anna's message to the truck.
+    assert_eq!(network.count(0, Counter::RuleForbids), 1);
 }
 
 #[test]
 fn a_stop_for_all_reaches_those_that_its_sender_may_reach_and_no_others() {
     let mut network = relay();
     let stop = SetEmergency::default();
-    network.send(
-        3,
-        Priority::Standard,
-        &message("61.1.1", "65535.255.255", &stop),
-    );
+    network.say(3, "61.1.1", "65535.255.255", &stop);
     pass_on(&mut network);
     let own = message("61.1.1", "101.255.255", &stop);
     assert_eq!(network.hosts[1].received, [own]);
@@ -297,9 +278,7 @@ fn fragments_of_one_key_complete_no_message_of_another() {
 fn a_message_goes_only_to_the_session_of_its_destination() {
     let mut network = relay();
     let query = message("200.1.1", "62.1.1", &QueryVelocityState::default());
-    network.hosts[0]
-        .transport
-        .send_to_all(Priority::Standard, &query);
+    network.send_to_all(0, &query);
     network.run(SECOND);
     for host in 1..=3 {
         assert!(network.hosts[host].received.is_empty(), "{host}");
@@ -307,9 +286,7 @@ fn a_message_goes_only_to_the_session_of_its_destination() {
     // Bert exchanges messages with the truck alone.
     assert!(network.hosts[4].received.is_empty());
     let query = message("102.1.1", "62.1.1", &QueryVelocityState::default());
-    network.hosts[0]
-        .transport
-        .send_to_all(Priority::Standard, &query);
+    network.send_to_all(0, &query);
     network.run(SECOND);
     assert_eq!(network.hosts[4].received, [query]);
 }
@@ -321,7 +298,7 @@ fn each_answer_about_control_and_its_loss_are_recorded() {
     for component in 1..=200 {
         let to = format!("101.1.{component}");
         let request = RequestControl { authority_code: 1 };
-        network.send(1, Priority::Standard, &message("60.1.1", &to, &request));
+        network.say(1, "60.1.1", &to, &request);
     }
     network.run(SECOND);
     let told: [Bytes; 3] = [
@@ -360,15 +337,6 @@ fn refused_messages_do_not_displace_the_record_of_what_was_done() {
 #[test]
 fn a_handover_is_recorded_with_each_of_its_answers() {
     let (mut network, ..) = vehicle_with_rules("control=127");
-    let raw = |source: &str, destination: &str, payload: &'static [u8]| {
-        let (source, destination) = (source.parse().unwrap(), destination.parse().unwrap());
-        judp::encode(&Frame::new(
-            source,
-            destination,
-            Bytes::from_static(payload),
-        ))
-        .unwrap()
-    };
     // Authority 100, and 200; no explanation.
     for request in [b"\x31\xFF\x64\0", b"\x31\xFF\xC8\0"] {
         network.send(1, Priority::Standard, &raw("60.1.1", "101.1.1", request));
