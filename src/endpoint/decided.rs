@@ -48,29 +48,37 @@ impl Endpoint {
         &mut self,
         arrival: Arrival<'_>,
     ) -> Result<Admitted, Counter> {
+        let admitted = self.admit(arrival.frame, arrival.path.peer);
+        admitted.map_err(|why| {
+            self.handle_refusal(arrival, why);
+            Counter::NotGranted
+        })
+    }
+
+    fn handle_refusal(&mut self, arrival: Arrival<'_>, why: Unaccepted) {
         let Arrival {
             frame, now, path, ..
         } = arrival;
-        let admitted = self.admit(frame, path.peer);
-        if admitted.is_ok() && (!self.decisions.is_recording || is_session(path.peer)) {
-            return admitted.map_err(|_| Counter::NotGranted);
+        if let Some(refusal) = Decision::of(frame, Err(why), &self.config.access.table) {
+            if self.warnings.is_due(now, Warning::NotGranted) {
+                warn!(from = %path.peer, "refused {refusal}");
+            }
+            self.record(refusal, path.peer);
         }
-        let checked = admitted.as_ref().map(|_| ()).map_err(|why| *why);
-        let Some(decision) = Decision::of(frame, checked, &self.config.access.table) else {
-            return admitted.map_err(|_| Counter::NotGranted);
-        };
-        let warning = Warning::NotGranted;
-        if decision.is_refusal() && self.warnings.is_due(now, warning) {
-            warn!(from = %path.peer, "refused {decision}");
-        }
-        self.record(decision, path.peer);
-        if checked.is_err()
-            && let Some(denial) = denial(frame)
-        {
+        if let Some(denial) = denial(frame) {
             // What cannot be encoded for the link is not answered.
             let _sent = self.send_along(now, path, &denial);
         }
-        admitted.map_err(|_| Counter::NotGranted)
+    }
+
+    /// Records a message that was delivered or passed on.
+    pub(super) fn record_passed(&mut self, frame: &Frame, from: Remote) {
+        if !self.decisions.is_recording || is_session(from) {
+            return;
+        }
+        if let Some(passed) = Decision::of(frame, Ok(()), &self.config.access.table) {
+            self.record(passed, from);
+        }
     }
 
     /// Records what a component tells a client of a plain link about its control.

@@ -69,8 +69,9 @@ impl Endpoint {
         for_many && sender.is_some_and(|state| is_elsewhere(&state.peer))
     }
 
-    /// Forwards a message towards its receivers, unless they are where it came from.
-    pub(super) fn pass_on(&mut self, arrival: Arrival<'_>) {
+    /// Forwards a message towards its receivers, unless they are where it came from; returns whether it was
+    /// forwarded.
+    pub(super) fn pass_on(&mut self, arrival: Arrival<'_>) -> bool {
         let (source, destination) = (arrival.frame.source, arrival.frame.destination);
         let passed = self.next_hops(arrival).and_then(|(hops, version)| {
             let frame = with_header(arrival.frame, version).ok_or(Counter::CannotForward)?;
@@ -81,6 +82,7 @@ impl Endpoint {
         let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
         trace!(%source, %destination, %outcome, "passing on");
         self.counters.add(outcome);
+        passed.is_ok()
     }
 
     /// The next hops of a message, and the header to use.

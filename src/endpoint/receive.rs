@@ -214,8 +214,8 @@ impl Endpoint {
                 self.peers
                     .recognise(frame.source, path, |it| it.handle_frame_to_all(frame));
             }
-            if passes {
-                self.pass_on(arrival);
+            if passes && self.pass_on(arrival) && !is_for_us {
+                self.record_passed(frame, path.peer);
             }
         }
         if !is_for_us || is_challenge(frame) {
@@ -422,12 +422,18 @@ impl Endpoint {
     pub(super) fn deliver(&mut self, message: &Received, but: Option<JausId>, sink: &mut dyn Sink) {
         let (source, destination) = (message.source, message.destination);
         let receivers = receivers(&self.components, source, destination, message.broadcast);
+        let mut is_delivered = false;
         for to in receivers.filter(|&to| Some(to) != but) {
+            is_delivered = true;
             sink.deliver(Received {
                 to,
                 ..message.clone()
             });
             self.counters.add(Counter::MessagesDelivered);
+        }
+        if let Some(path) = message.path.filter(|_| is_delivered) {
+            let frame = Frame::new(source, destination, message.payload.clone());
+            self.record_passed(&frame, path.peer);
         }
     }
 }

@@ -1,8 +1,10 @@
-//! The chain of a log: each line has the hash of the line before it.
+//! The chain of a log: each line has the hash of the whole line before it.
 
 use std::fmt;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use crate::entry::Entry;
@@ -26,9 +28,9 @@ impl fmt::Display for LineHash {
 /// The end of a chain, to which the next line is added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ChainEnd {
-    /// The number of the last complete line; 0 if there is none.
+    /// The number of the last whole line; 0 if there is none.
     pub(crate) number: u64,
-    /// The hash of the last line; zeros if there is none.
+    /// Its hash; zeros if there is none.
     pub(crate) hash: LineHash,
 }
 
@@ -37,7 +39,7 @@ pub(crate) struct ChainEnd {
 pub(crate) struct Seal {
     /// Lines count from 1, across all files of the log.
     pub(crate) number: u64,
-    /// The hash of the line before; zeros in the first.
+    /// The hash of the whole line before; zeros in the first.
     pub(crate) after: String,
 }
 
@@ -56,29 +58,48 @@ struct SealedEntry<'e> {
     after: String,
 }
 
+/// A line with its end, and the end of the chain after it.
+#[derive(Clone, Debug)]
+pub(crate) struct SealedLine {
+    pub(crate) text: String,
+    pub(crate) end: ChainEnd,
+}
+
+impl SealedLine {
+    /// The line with its hash, for a copy elsewhere, which then shows what the file has lost.
+    pub(crate) fn copy(&self, file: &Path, is_written: bool) -> String {
+        let (line, hash) = (self.text.trim_end_matches("}\n"), self.end.hash);
+        let file = Value::from(file.to_string_lossy());
+        let unwritten = if is_written {
+            ""
+        } else {
+            r#","unwritten":true"#
+        };
+        format!(r#"{line},"hash":"{hash}","file":{file}{unwritten}}}"#)
+    }
+}
+
 impl ChainEnd {
-    /// The end of a chain with these lines; `None` without lines. The last one may be incomplete.
+    /// The last whole line of this content; `None` if it has none. Of a torn line the chain has nothing.
     pub(crate) fn of(content: &[u8]) -> Option<Self> {
-        let content = content.strip_suffix(b"\n").unwrap_or(content);
         let mut lines = content.rsplit(|&octet| octet == b'\n');
-        let last = lines.next().filter(|it| !it.is_empty())?;
-        let mut complete = std::iter::once(last).chain(lines).filter_map(Seal::of);
-        Some(Self {
-            number: complete.next().map_or(0, |seal| seal.number),
-            hash: LineHash::of(last),
+        lines.find_map(|line| {
+            let (number, hash) = (Seal::of(line)?.number, LineHash::of(line));
+            Some(Self { number, hash })
         })
     }
 
-    /// The next line, with its end, and the end of the chain after it.
-    pub(crate) fn seal(self, entry: &Entry) -> serde_json::Result<(Vec<u8>, Self)> {
+    /// The next line.
+    pub(crate) fn seal(self, entry: &Entry) -> serde_json::Result<SealedLine> {
         let number = self.number + 1;
-        let mut line = serde_json::to_vec(&SealedEntry {
+        let mut text = serde_json::to_string(&SealedEntry {
             entry,
             number,
             after: self.hash.to_string(),
         })?;
-        let hash = LineHash::of(&line);
-        line.push(b'\n');
-        Ok((line, Self { number, hash }))
+        let hash = LineHash::of(text.as_bytes());
+        text.push('\n');
+        let end = Self { number, hash };
+        Ok(SealedLine { text, end })
     }
 }

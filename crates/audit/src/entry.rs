@@ -6,6 +6,8 @@ use std::time::SystemTime;
 use jaus::rights::{Decision, Verdict};
 use serde::{Serialize, Serializer};
 
+use crate::action::Action;
+
 /// How an action ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -28,8 +30,11 @@ pub struct Entry {
     pub time: SystemTime,
     /// The name of the key or user, as this node's files know it.
     pub who: String,
-    /// What was done: the name of a message, or a word such as `login`.
+    /// What was done: the words of an [`Action`], or else the name of a message.
     pub what: String,
+    /// The message by which it was done, unless `what` names it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
     /// To whom: a JAUS id, or a user.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub to: Option<String>,
@@ -66,6 +71,7 @@ impl Entry {
             time: SystemTime::now(),
             who: text(who),
             what: text(what),
+            message: None,
             to: None,
             result,
             why: None,
@@ -82,25 +88,30 @@ impl Entry {
     pub fn of(who: impl Display, decision: &Decision) -> Self {
         let (source, destination) = (decision.source, decision.destination);
         let by_client = |result| {
-            let entry = Self::new(&who, &decision.what, result);
-            entry.id(source).to(destination)
+            let entry = Self::new(&who, Action::of_messages(&decision.what), result);
+            entry.by(&decision.what).id(source).to(destination)
         };
-        let by_component = |what, result| {
-            let why = format_args!("the component's answer: {}", decision.what);
-            let entry = Self::new(&who, what, result);
-            entry.id(destination).to(source).because(why)
+        let by_component = |what: Action, result| {
+            let entry = Self::new(&who, what, result).by(&decision.what);
+            entry.id(destination).to(source)
         };
         match decision.verdict {
             Verdict::Refused(why) => by_client(Outcome::Refused).because(why),
-            Verdict::Granted => by_component("control", Outcome::Allowed),
-            Verdict::Denied => by_component("control", Outcome::Refused),
-            Verdict::Ended => by_component("end of control", Outcome::Allowed),
+            Verdict::Granted => by_component(Action::ControlGranted, Outcome::Allowed),
+            Verdict::Denied => by_component(Action::ControlDenied, Outcome::Refused),
+            Verdict::Ended => by_component(Action::ControlEnded, Outcome::Allowed),
             // It was passed on.
             _ => Self {
                 is_free: decision.is_free,
                 ..by_client(Outcome::Allowed)
             },
         }
+    }
+
+    /// The message by which it was done.
+    fn by(mut self, message: &str) -> Self {
+        self.message = (self.what != message).then(|| text(message));
+        self
     }
 
     /// To whom it was done.
@@ -145,35 +156,9 @@ impl Entry {
         self
     }
 
-    /// Whether it differs from another entry in nothing but time.
-    pub(crate) fn repeats(&self, other: &Self) -> bool {
-        let parts = |it: &Self| {
-            let Self {
-                time: _,
-                who,
-                what,
-                to,
-                result,
-                why,
-                id,
-                address,
-                key,
-                times: _,
-                is_free: _,
-            } = it;
-            (who, what, to, result, why, id, address, key)
-                == (
-                    &self.who,
-                    &self.what,
-                    &self.to,
-                    &self.result,
-                    &self.why,
-                    &self.id,
-                    &self.address,
-                    &self.key,
-                )
-        };
-        parts(other)
+    /// Whether it shows what was done by a right: each such entry is kept, with its own time.
+    pub(crate) fn is_evidence(&self) -> bool {
+        self.result == Outcome::Allowed && !self.is_free
     }
 }
 

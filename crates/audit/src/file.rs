@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use jaus_files::{Readers, append};
 
-use crate::chain::ChainEnd;
+use crate::chain::{ChainEnd, SealedLine};
 use crate::entry::Entry;
 
 /// Limits of the log.
@@ -36,7 +36,7 @@ pub(crate) struct LogFile {
     file: File,
     length: u64,
     chain: ChainEnd,
-    /// Whether the last line may be incomplete, because it could not be written.
+    /// Whether the last line may be torn, because writing it has failed.
     is_torn: bool,
 }
 
@@ -59,30 +59,45 @@ impl LogFile {
         })
     }
 
-    /// Appends an entry, in a single write so that a crash leaves no half of it.
-    pub(crate) fn append(&mut self, entry: &Entry) -> io::Result<()> {
-        if self.is_torn {
-            self.end_torn_line()?;
-        }
-        let (line, chain) = self.chain.seal(entry)?;
-        if self.length > 0 && self.length + line.len() as u64 > self.limits.file {
+    /// Appends an entry, in a single write, so that a crash tears one line at most. `sealed` gets its line,
+    /// and whether it was written.
+    pub(crate) fn append(
+        &mut self,
+        entry: &Entry,
+        sealed: impl FnOnce(&Path, &SealedLine, bool),
+    ) -> io::Result<()> {
+        let ended = self.end_torn_line();
+        let line = self.chain.seal(entry)?;
+        let written = ended.and_then(|()| self.write(&line));
+        sealed(&self.path, &line, written.is_ok());
+        written
+    }
+
+    fn write(&mut self, line: &SealedLine) -> io::Result<()> {
+        let length = line.text.len() as u64;
+        if self.length > 0 && self.length + length > self.limits.file {
             self.rotate()?;
         }
         self.is_torn = true;
-        self.file.write_all(&line)?;
+        self.file.write_all(line.text.as_bytes())?;
         self.is_torn = false;
-        self.length += line.len() as u64;
-        self.chain = chain;
+        self.length += length;
+        self.chain = line.end;
         Ok(())
     }
 
-    /// Ends a line that is incomplete. The next one has its hash.
+    /// Ends a line that may be torn. The chain goes on from the last whole one.
     fn end_torn_line(&mut self) -> io::Result<()> {
+        if !self.is_torn {
+            return Ok(());
+        }
         let content = fs::read(&self.path)?;
+        self.length = content.len() as u64;
         if content.last().is_some_and(|&octet| octet != b'\n') {
             self.file.write_all(b"\n")?;
+            self.length += 1;
         }
-        self.length = content.len() as u64 + 1;
+        // An interrupted write may have left a whole line.
         self.chain = ChainEnd::of(&content).unwrap_or(self.chain);
         self.is_torn = false;
         Ok(())
@@ -133,19 +148,40 @@ fn locked(path: &Path) -> io::Result<File> {
 }
 
 /// A full file of the log with this path; the newest is number 1.
-pub(crate) fn full(path: &Path, number: u32) -> PathBuf {
+fn full(path: &Path, number: u32) -> PathBuf {
     let mut name = path.to_owned().into_os_string();
     name.push(format!(".{number}"));
     name.into()
 }
 
-/// The end of the chain in the newest full file.
+/// The full files of the log with this path, the oldest first. A gap in their numbers is not the end: a
+/// rotation may have been interrupted.
+pub(crate) fn full_files(path: &Path) -> Vec<PathBuf> {
+    let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
+    let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter();
+    let names = entries.flatten().flatten().map(|entry| entry.file_name());
+    let mut numbers: Vec<u32> = names
+        .filter_map(|name| {
+            let number = name.to_str()?.strip_prefix(path.file_name()?.to_str()?)?;
+            number.strip_prefix('.')?.parse().ok()
+        })
+        .collect();
+    numbers.sort_unstable();
+    numbers
+        .iter()
+        .rev()
+        .map(|&number| full(path, number))
+        .collect()
+}
+
+/// The end of the chain in the newest full file with a whole line.
 fn end_of_full(path: &Path) -> io::Result<ChainEnd> {
-    match fs::read(full(path, 1)) {
-        Ok(content) => Ok(ChainEnd::of(&content).unwrap_or_default()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(ChainEnd::default()),
-        Err(error) => Err(error),
+    for file in full_files(path).iter().rev() {
+        if let Some(end) = ChainEnd::of(&fs::read(file)?) {
+            return Ok(end);
+        }
     }
+    Ok(ChainEnd::default())
 }
 
 #[cfg(test)]
@@ -164,7 +200,7 @@ mod tests {
         let limits = Limits { file: 10, kept: 2 };
         let mut log = LogFile::open(&path, limits).unwrap();
         for what in ["one", "two", "three", "four"] {
-            log.append(&entry(what)).unwrap();
+            log.append(&entry(what), |_, _, _| {}).unwrap();
         }
         let has = |name: &str, what: &str| {
             let text = fs::read_to_string(folder.path().join(name)).unwrap();
@@ -181,7 +217,7 @@ mod tests {
         let path = folder.path().join("audit.jsonl");
         for what in ["one", "two"] {
             let mut log = LogFile::open(&path, Limits::default()).unwrap();
-            log.append(&entry(what)).unwrap();
+            log.append(&entry(what), |_, _, _| {}).unwrap();
             let second = LogFile::open(&path, Limits::default()).unwrap_err();
             assert!(second.to_string().contains("another program"), "{second}");
         }

@@ -65,7 +65,8 @@ impl fmt::Display for ForwardTo {
     }
 }
 
-/// The open socket. It never waits: what the other side does not take is lost there, and is in the file.
+/// The open socket. It never waits: what the other side does not take is lost there, which shows in the
+/// numbers of the lines.
 #[derive(Debug)]
 pub(crate) struct Forwarder {
     socket: Socket,
@@ -108,8 +109,9 @@ impl Forwarder {
         })
     }
 
-    pub(crate) fn send(&mut self, entry: &Entry) {
-        let sent = self.try_send(entry);
+    /// Sends the line of an entry.
+    pub(crate) fn send(&mut self, entry: &Entry, line: &str) {
+        let sent = self.try_send(entry, line);
         let was_failing = std::mem::replace(&mut self.is_failing, sent.is_err());
         if let Err(error) = sent
             && !was_failing
@@ -118,12 +120,11 @@ impl Forwarder {
         }
     }
 
-    fn try_send(&self, entry: &Entry) -> io::Result<()> {
-        let json = serde_json::to_string(entry)?;
+    fn try_send(&self, entry: &Entry, line: &str) -> io::Result<()> {
         match &self.socket {
             #[cfg(unix)]
-            Socket::Journald(socket) => socket.send(journald(entry, &json).as_bytes())?,
-            Socket::Syslog(socket) => socket.send(syslog(entry, &json).as_bytes())?,
+            Socket::Journald(socket) => socket.send(journald(entry, line).as_bytes())?,
+            Socket::Syslog(socket) => socket.send(syslog(entry, line).as_bytes())?,
         };
         Ok(())
     }
@@ -163,6 +164,10 @@ mod tests {
         Entry::new("con\nsole", "login", Outcome::Refused)
     }
 
+    fn line() -> String {
+        serde_json::to_string(&entry()).unwrap()
+    }
+
     #[cfg(unix)]
     #[test]
     fn journald_gets_fields_whatever_a_text_contains() {
@@ -170,7 +175,7 @@ mod tests {
         let path = folder.path().join("socket");
         let journald = UnixDatagram::bind(&path).unwrap();
         let mut forward = Forwarder::open(ForwardTo::Journald(path)).unwrap();
-        forward.send(&entry());
+        forward.send(&entry(), &line());
         let mut octets = [0; 1000];
         let length = journald.recv(&mut octets).unwrap();
         let text = std::str::from_utf8(&octets[..length]).unwrap();
@@ -187,7 +192,7 @@ mod tests {
     fn a_syslog_server_gets_a_message_of_rfc_5424() {
         let server = UdpSocket::bind("127.0.0.1:0").unwrap();
         let to = ForwardTo::Syslog(server.local_addr().unwrap());
-        Forwarder::open(to).unwrap().send(&entry());
+        Forwarder::open(to).unwrap().send(&entry(), &line());
         let mut octets = [0; 1000];
         let length = server.recv(&mut octets).unwrap();
         let text = std::str::from_utf8(&octets[..length]).unwrap();

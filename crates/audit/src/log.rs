@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::action::Action;
 use crate::entry::{Entry, Outcome};
 use crate::file::Limits;
 use crate::forward::{ForwardTo, Forwarder};
@@ -238,56 +239,60 @@ impl Writer {
     }
 
     fn note(&mut self, entry: &Entry) {
-        let now = Instant::now();
-        let is_refusal = entry.result == Outcome::Refused;
-        let stream = match is_refusal {
-            true => &mut self.refusals,
-            false => &mut self.evidence,
-        };
-        match stream.note(now, entry) {
-            Ok(Some(entry)) => self.forward(entry),
-            Ok(None) => {}
-            Err(error) => self.fail(&error),
+        if self.stream(entry).admits(Instant::now(), entry) {
+            self.append(entry, true);
         }
-        if is_refusal {
+        if entry.result == Outcome::Refused {
             self.shared.refusals.fetch_sub(1, Ordering::Relaxed);
         }
     }
 
     fn write_counted(&mut self, until: Option<Instant>) {
-        for entry in self.evidence.counted(until) {
-            self.append(&entry);
-        }
-        for entry in self.refusals.counted(until) {
-            self.append(&entry);
+        let counted = [&mut self.evidence, &mut self.refusals].map(|it| it.counted(until));
+        for entry in counted.into_iter().flatten() {
+            self.append(&entry, true);
         }
     }
 
-    /// Appends an entry to the file of its kind.
-    fn append(&mut self, entry: &Entry) {
-        let stream = match entry.result {
+    /// The file for entries of this kind.
+    fn stream(&mut self, entry: &Entry) -> &mut Stream {
+        match entry.result {
             Outcome::Refused => &mut self.refusals,
             _ => &mut self.evidence,
-        };
-        match stream.append(entry) {
-            Ok(()) => self.forward(entry),
-            Err(error) => self.fail(&error),
+        }
+    }
+
+    /// Appends an entry to the file of its kind, and forwards it; also if it cannot be written, if so wanted.
+    fn append(&mut self, entry: &Entry, forwards_unwritten: bool) {
+        let mut forward = self.forward.take();
+        let written = self.stream(entry).append(entry, |file, line, is_written| {
+            if let Some(forward) = forward.as_mut()
+                && (is_written || forwards_unwritten)
+            {
+                forward.send(entry, &line.copy(file, is_written));
+            }
+        });
+        self.forward = forward;
+        if let Err(error) = written {
+            self.unwritten += 1;
+            self.report(&error);
         }
     }
 
     /// Records what is not recorded, in the file in which it is missing.
     fn note_losses(&mut self) {
-        let slow = "entries lost, because the disk was too slow";
-        let failed = "entries lost, because the log could not be written";
+        let slow = "the disk was too slow";
+        let failed = "the log could not be written";
         let unwritten = std::mem::take(&mut self.unwritten);
         for (lost, why) in [
             (self.shared.lost.swap(0, Ordering::Relaxed), slow),
             (unwritten, failed),
         ] {
             if lost > 0 {
-                let entry = Entry::new("jaus", "audit", Outcome::Failed);
+                let entry = Entry::new("jaus", Action::EntriesLost, Outcome::Failed);
                 let before = self.unwritten;
-                self.append(&entry.because(why).times(lost));
+                // It is tried each second. Those that were not written have been forwarded.
+                self.append(&entry.because(why).times(lost), false);
                 if self.unwritten > before {
                     // Itself was not written either; it is no entry that is lost.
                     self.unwritten = before + lost;
@@ -296,8 +301,8 @@ impl Writer {
         }
         let refusals = self.shared.lost_refusals.swap(0, Ordering::Relaxed);
         if refusals > 0 {
-            let entry = Entry::new("jaus", "audit", Outcome::Refused);
-            self.append(&entry.because(slow).times(refusals));
+            let entry = Entry::new("jaus", Action::EntriesLost, Outcome::Refused);
+            self.append(&entry.because(slow).times(refusals), false);
         }
     }
 
@@ -313,17 +318,6 @@ impl Writer {
             self.reported = None;
             tracing::info!("the audit log is written again");
         }
-    }
-
-    fn forward(&mut self, entry: &Entry) {
-        if let Some(forward) = &mut self.forward {
-            forward.send(entry);
-        }
-    }
-
-    fn fail(&mut self, error: &io::Error) {
-        self.unwritten += 1;
-        self.report(error);
     }
 
     fn report(&mut self, error: &io::Error) {
@@ -350,24 +344,29 @@ mod tests {
     }
 
     #[test]
-    fn each_entry_is_a_line_and_repetitions_are_counted() {
+    fn each_entry_is_a_line_and_repeated_refusals_are_counted() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.jsonl");
         let log = AuditLog::open(&path, AuditSettings::default()).unwrap();
         for _ in 0..100 {
-            log.clone()
-                .write(Entry::new("tablet", "Reset", Outcome::Allowed).to("101.1.1"));
+            let entry = |result| Entry::new("tablet", "Reset", result).to("101.1.1");
+            log.clone().write(entry(Outcome::Refused));
+            log.write(entry(Outcome::Allowed));
         }
         log.write(Entry::new("console\n", "login", Outcome::Allowed));
         drop(log);
-        let lines = lines(&path);
-        assert_eq!(lines.len(), 3);
-        assert_eq!(lines[0]["what"], "Reset");
-        assert_eq!(lines[0].get("times"), None);
-        assert_eq!(lines[1]["who"], r"console\n");
+        let evidence = lines(&path);
         assert_eq!(
-            (&lines[2]["times"], &lines[2]["number"]),
-            (&99.into(), &3.into())
+            (evidence.len(), &evidence[0]["what"]),
+            (101, &"Reset".into())
+        );
+        assert_eq!(evidence[0].get("times"), None);
+        assert_eq!(evidence[100]["who"], r"console\n");
+        let refused = lines(&refusals_of(&path));
+        assert_eq!(refused.len(), 2);
+        assert_eq!(
+            (&refused[1]["times"], &refused[1]["number"]),
+            (&99.into(), &2.into())
         );
     }
 
@@ -402,11 +401,13 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn while_it_cannot_be_written_commands_are_refused_if_so_set() {
+    fn while_it_cannot_be_written_entries_are_forwarded_and_commands_refused_if_so_set() {
         // Rotation fails, because a folder is in its way.
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.jsonl");
         let obstacle = folder.path().join("audit.jsonl.1");
+        let journald = folder.path().join("socket");
+        let copies = std::os::unix::net::UnixDatagram::bind(&journald).unwrap();
         let settings = AuditSettings {
             limits: Limits { file: 10, kept: 1 },
             ..AuditSettings::default()
@@ -418,7 +419,9 @@ mod tests {
             }
             assert!(what());
         };
-        let settings = settings.unwritable(Unwritable::RefuseCommands);
+        let settings = settings
+            .unwritable(Unwritable::RefuseCommands)
+            .forward(Some(ForwardTo::Journald(journald)));
         let log = AuditLog::open(&path, settings).unwrap();
         fs::create_dir_all(obstacle.join("not empty")).unwrap();
         for what in ["one", "two", "three"] {
@@ -434,6 +437,23 @@ mod tests {
             (&"failed".into(), &2.into())
         );
         crate::verify(&path, None).unwrap();
+        // The copy has all of them, and shows which the file lacks.
+        let mut octets = [0; 2000];
+        let mut copy = || -> Value {
+            let length = copies.recv(&mut octets).unwrap();
+            let text = std::str::from_utf8(&octets[..length]).unwrap();
+            let line = text.lines().next().unwrap();
+            serde_json::from_str(line.strip_prefix("MESSAGE=").unwrap()).unwrap()
+        };
+        let all = [copy(), copy(), copy(), copy()];
+        let of = |key: &str| all.each_ref().map(|it| it[key].clone());
+        assert_eq!(of("what"), ["one", "two", "three", "entries lost"]);
+        assert_eq!(of("number"), [1, 2, 2, 2]);
+        let (no, yes) = (Value::Null, Value::Bool(true));
+        assert_eq!(of("unwritten"), [no.clone(), yes.clone(), yes, no]);
+        assert_eq!(all[3]["after"], all[0]["hash"]);
+        let noted = (2, all[3]["hash"].as_str().unwrap());
+        crate::verify(&path, Some(noted)).unwrap();
     }
 
     #[test]

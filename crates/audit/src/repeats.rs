@@ -1,13 +1,13 @@
 //! Keeps a flood of the same entry from filling the log.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use crate::entry::{Entry, Outcome};
 
 /// How long repetitions of an entry are counted before a line says how many there were.
 const PERIOD: Duration = Duration::from_secs(10);
-/// Different entries whose repetitions are counted at a time. Of further ones refusals are counted
-/// together, so that a flood of them does not fill the log, and all others are written.
+/// Different entries whose repetitions are counted at a time. Further refusals are counted together, so that
+/// a flood of them does not fill the log, and all others are written.
 const MOST: usize = 64;
 
 /// The entries written in the last [`PERIOD`], each with the repetitions since.
@@ -20,29 +20,41 @@ pub(crate) struct Repeats {
 
 #[derive(Debug)]
 struct Recent {
+    /// Without its time and number.
     entry: Entry,
     again: u64,
+    last: SystemTime,
     due: Instant,
 }
 
 impl Repeats {
-    /// Whether the entry is to be written now. If not, it has been counted.
+    /// Whether the entry is to be written now. If not, it has been counted. Evidence is always written: when
+    /// control was granted and ended shows in its times and order.
     pub(crate) fn is_new(&mut self, now: Instant, entry: &Entry) -> bool {
-        if let Some(recent) = self.recent.iter_mut().find(|it| entry.repeats(&it.entry)) {
-            recent.again += 1;
-            recent.entry.time = entry.time;
+        if entry.is_evidence() {
+            return true;
+        }
+        let timeless = Entry {
+            time: SystemTime::UNIX_EPOCH,
+            times: 1,
+            ..entry.clone()
+        };
+        if let Some(recent) = self.recent.iter_mut().find(|it| it.entry == timeless) {
+            recent.again += entry.times;
+            recent.last = entry.time;
             return false;
         }
         if self.recent.len() < MOST {
             self.recent.push(Recent {
-                entry: entry.clone(),
+                entry: timeless,
                 again: 0,
+                last: entry.time,
                 due: now + PERIOD,
             });
             return true;
         }
         let is_counted = entry.result == Outcome::Refused;
-        self.others += u64::from(is_counted);
+        self.others += entry.times * u64::from(is_counted);
         !is_counted
     }
 
@@ -55,6 +67,7 @@ impl Repeats {
             false => std::mem::take(&mut self.others),
         };
         let again = |it: Recent| Entry {
+            time: it.last,
             times: it.again,
             ..it.entry
         };
@@ -113,11 +126,23 @@ mod tests {
         for index in MOST..1000 {
             assert!(!repeats.is_new(start, &entry(&index.to_string())));
         }
-        let allowed = Entry::new("console", "Reset", Outcome::Allowed);
-        assert!(repeats.is_new(start, &allowed) && repeats.is_new(start, &allowed));
         let counted = repeats.take(repeats.due());
         assert_eq!(counted.len(), 1);
         assert_eq!(counted[0].times, 1000 - MOST as u64);
         assert!(repeats.is_new(start + PERIOD, &entry("1000")));
+    }
+
+    #[test]
+    fn evidence_is_written_each_time_and_what_everybody_may_is_counted() {
+        let (now, mut repeats) = (Instant::now(), Repeats::default());
+        for what in ["control granted", "control ended"].repeat(2) {
+            assert!(repeats.is_new(now, &Entry::new("console", what, Outcome::Allowed)));
+        }
+        let release = Entry {
+            is_free: true,
+            ..Entry::new("console", "control released", Outcome::Allowed).times(3)
+        };
+        assert!(repeats.is_new(now, &release) && !repeats.is_new(now, &release));
+        assert_eq!(repeats.take(None)[0].times, 3, "those of the second entry");
     }
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use jaus_limits::{Buckets, Rate};
 
+use crate::chain::SealedLine;
 use crate::entry::{Entry, Outcome};
 use crate::file::{Limits, LogFile};
 use crate::repeats::Repeats;
@@ -43,21 +44,14 @@ impl Stream {
         })
     }
 
-    /// Appends an entry, or counts it. Returns it if it was appended.
-    pub(crate) fn note<'e>(
-        &mut self,
-        now: Instant,
-        entry: &'e Entry,
-    ) -> io::Result<Option<&'e Entry>> {
+    /// Whether an entry is to be appended. If not, it has been counted.
+    pub(crate) fn admits(&mut self, now: Instant, entry: &Entry) -> bool {
         if !self.repeats.is_new(now, entry) {
-            return Ok(None);
+            return false;
         }
-        if !self.takes_share(now, entry) {
-            self.beyond += 1;
-            return Ok(None);
-        }
-        self.file.append(entry)?;
-        Ok(Some(entry))
+        let has_share = self.takes_share(now, entry);
+        self.beyond += u64::from(!has_share);
+        has_share
     }
 
     fn takes_share(&mut self, now: Instant, entry: &Entry) -> bool {
@@ -67,9 +61,9 @@ impl Stream {
             Some(key) => key.clone(),
             None => format!("{} {address}", entry.who),
         };
-        let shares = match entry.is_free || entry.result == Outcome::Refused {
-            true => &mut self.shares,
-            false => &mut self.evidence_shares,
+        let shares = match entry.is_evidence() {
+            true => &mut self.evidence_shares,
+            false => &mut self.shares,
         };
         shares.take(now, client)
     }
@@ -87,9 +81,13 @@ impl Stream {
         counted
     }
 
-    /// Appends an entry of the log itself.
-    pub(crate) fn append(&mut self, entry: &Entry) -> io::Result<()> {
-        self.file.append(entry)
+    /// Appends an entry; as [`LogFile::append`].
+    pub(crate) fn append(
+        &mut self,
+        entry: &Entry,
+        sealed: impl FnOnce(&Path, &SealedLine, bool),
+    ) -> io::Result<()> {
+        self.file.append(entry, sealed)
     }
 
     /// Waits until the disk has what was appended.
@@ -117,8 +115,9 @@ mod tests {
     fn a_client_takes_no_more_than_its_share_and_others_keep_theirs() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.jsonl");
-        let open = || Stream::open(&path, Limits::default(), Outcome::Allowed);
-        let (mut stream, start) = (open().unwrap(), Instant::now());
+        let stream = Stream::open(&path, Limits::default(), Outcome::Allowed);
+        let (mut stream, start) = (stream.unwrap(), Instant::now());
+        let mut admitted = 0;
         for index in 0..10_000 {
             let release = Entry::new("tablet", "ReleaseControl", Outcome::Allowed);
             let entry = release.to(index).address(format_args!("10.0.0.2:{index}"));
@@ -126,19 +125,18 @@ mod tests {
                 is_free: true,
                 ..entry.key("key of the tablet")
             };
-            stream.note(start, &entry).unwrap();
+            admitted += u64::from(stream.admits(start, &entry));
         }
+        assert_eq!(admitted, 200);
         // What needs a right is recorded, of others and of the same client.
         for evidence in [
             Entry::new("console", "RequestControl", Outcome::Allowed),
             Entry::new("tablet", "RequestControl", Outcome::Allowed).key("key of the tablet"),
         ] {
-            assert!(stream.note(start, &evidence).unwrap().is_some());
+            assert!(stream.admits(start, &evidence));
         }
         let counted = stream.counted(Some(start + Duration::from_secs(10)));
         let beyond = counted.iter().find(|it| it.who == "several").unwrap();
         assert_eq!(beyond.times, 9800);
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(text.lines().count(), 202);
     }
 }

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::chain::{ChainEnd, LineHash, Seal};
-use crate::file::full;
+use crate::file::full_files;
 
 /// A chain without a break.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,8 +20,9 @@ pub struct VerifiedLog {
     pub last: u64,
     /// The hash of the last line.
     pub hash: LineHash,
-    /// Incomplete lines, of which the next lines have the hashes: the program was interrupted.
-    pub incomplete: u64,
+    /// Torn lines, by file and number of the line there, from 1: the program was interrupted while it wrote
+    /// them. The chain goes on over them.
+    pub torn: Vec<(PathBuf, usize)>,
 }
 
 /// Why a log is not verified.
@@ -72,7 +73,7 @@ pub enum BrokenChain {
     #[error("the line before was changed: its hash is not the one that this line has")]
     Changed,
     /// The line itself is no line of a log.
-    #[error("this is no line of an audit log, and the next line does not have its hash")]
+    #[error("this is no line of an audit log, and the next line does not follow the one before")]
     Unreadable,
     /// A line has the number of another one.
     #[error("this line has number {number}, but {expected} follows")]
@@ -96,31 +97,26 @@ pub fn verify(path: &Path, noted: Option<(u64, &str)>) -> Result<VerifiedLog, Ve
     let mut check = Check {
         log: VerifiedLog::default(),
         before: None,
-        torn: None,
+        torn_before: None,
         noted,
     };
-    for file in files(path) {
+    let mut files = full_files(path);
+    // It is absent if a rotation was interrupted.
+    if path.exists() || files.is_empty() {
+        files.push(path.to_owned());
+    }
+    for file in files {
         check.file(file)?;
     }
     check.end()
 }
 
-/// The files of a log, the oldest first. A gap in their numbers is a gap in the chain.
-fn files(path: &Path) -> Vec<PathBuf> {
-    /// No log has more files: those in between may be missing.
-    const MOST: u32 = 1000;
-    let full = (1..=MOST).rev().map(|number| full(path, number));
-    let mut files: Vec<_> = full.filter(|file| file.exists()).collect();
-    files.push(path.to_owned());
-    files
-}
-
 struct Check<'n> {
     log: VerifiedLog,
-    /// The line before; `None` at the first.
+    /// The whole line before; `None` at the first.
     before: Option<ChainEnd>,
-    /// An incomplete line, until the next one tells its hash.
-    torn: Option<(PathBuf, usize)>,
+    /// The torn line after it, until the next whole one shows that none is missing.
+    torn_before: Option<(PathBuf, usize)>,
     noted: Option<(u64, &'n str)>,
 }
 
@@ -134,17 +130,16 @@ impl Check<'_> {
         let lines = content.split(|&octet| octet == b'\n').enumerate();
         for (index, line) in lines.filter(|_| !content.is_empty()) {
             let place = (file.clone(), index + 1);
-            let seal = Seal::of(line);
-            let number = seal.as_ref().map(|it| it.number);
-            match seal {
-                Some(seal) => self.line(place, &seal, LineHash::of(line))?,
-                None if self.torn.is_some() => return Err(self.unreadable(place)),
-                None => self.torn = Some(place),
-            }
-            let before = self.before.map_or(0, |it| it.number);
+            let Some(seal) = Seal::of(line) else {
+                self.log.torn.push(place.clone());
+                self.torn_before.get_or_insert(place);
+                continue;
+            };
+            let hash = LineHash::of(line);
+            self.line(place, &seal, hash)?;
             self.before = Some(ChainEnd {
-                number: number.unwrap_or(before),
-                hash: LineHash::of(line),
+                number: seal.number,
+                hash,
             });
         }
         self.log.files.push(file);
@@ -163,8 +158,10 @@ impl Check<'_> {
         let before = self.before.unwrap_or_default();
         let is_chained = is_first || seal.after == before.hash.to_string();
         let expected = before.number + 1;
-        if !is_chained && self.torn.is_some() {
-            return Err(self.unreadable((file, line)));
+        let torn_before = self.torn_before.take();
+        if let Some((file, line)) = torn_before.filter(|_| !is_chained) {
+            let broken = BrokenChain::Unreadable;
+            return Err(VerifyError::Broken { file, line, broken });
         }
         let broken = if is_first && self.is_noted_gone(seal) {
             Some(BrokenChain::Missing {
@@ -188,7 +185,6 @@ impl Check<'_> {
         if let Some(broken) = broken {
             return Err(VerifyError::Broken { file, line, broken });
         }
-        self.log.incomplete += u64::from(self.torn.take().is_some());
         if self.log.first == 0 {
             self.log.first = number;
         }
@@ -208,16 +204,7 @@ impl Check<'_> {
         })
     }
 
-    /// The error about the incomplete line, if there is one, or about this place.
-    fn unreadable(&mut self, place: (PathBuf, usize)) -> VerifyError {
-        let (file, line) = self.torn.take().unwrap_or(place);
-        let broken = BrokenChain::Unreadable;
-        VerifyError::Broken { file, line, broken }
-    }
-
-    fn end(mut self) -> Result<VerifiedLog, VerifyError> {
-        // Nothing follows that has its hash: the program was interrupted just now.
-        self.log.incomplete += u64::from(self.torn.take().is_some());
+    fn end(self) -> Result<VerifiedLog, VerifyError> {
         if let Some((noted, _)) = self.noted
             && noted > self.log.last
         {
@@ -242,7 +229,7 @@ mod tests {
             let limits = Limits { file: 600, kept: 9 };
             let mut file = LogFile::open(&path, limits).unwrap();
             let entry = Entry::new("console", format!("act {index}"), Outcome::Allowed);
-            file.append(&entry).unwrap();
+            file.append(&entry, |_, _, _| {}).unwrap();
         }
         (folder, path)
     }
@@ -265,7 +252,7 @@ mod tests {
         let verified = verify(&path, None).unwrap();
         assert!(verified.files.len() > 2, "{verified:?}");
         assert_eq!((verified.first, verified.last), (1, 10));
-        assert_eq!(verified.incomplete, 0);
+        assert_eq!(verified.torn, []);
         // The oldest file may be removed, as by rotation.
         fs::remove_file(&verified.files[0]).unwrap();
         let verified = verify(&path, None).unwrap();
@@ -290,9 +277,6 @@ mod tests {
         fs::write(&oldest, &text).unwrap();
         edit(&oldest, |lines| lines.insert(1, lines[0].clone()));
         assert!(broken(&path).starts_with(&format!("{name}:2: ")));
-        fs::write(&oldest, &text).unwrap();
-        edit(&oldest, |lines| lines[1].truncate(20));
-        assert!(broken(&path).starts_with(&format!("{name}:2: this is no line")));
         fs::write(&oldest, &text).unwrap();
         verify(&path, None).unwrap();
     }
@@ -347,25 +331,64 @@ mod tests {
         for _ in 0..4 {
             let mut file = LogFile::open(&path, Limits::default()).unwrap();
             let entry = Entry::new("console", "another act", Outcome::Allowed);
-            file.append(&entry).unwrap();
+            file.append(&entry, |_, _, _| {}).unwrap();
         }
         let error = verify(&path, noted).unwrap_err().to_string();
         assert!(error.contains("another hash when it was noted"), "{error}");
     }
 
     #[test]
-    fn an_interrupted_line_is_covered_by_the_next_one() {
-        let (_folder, path) = log(2);
-        let mut text = fs::read_to_string(&path).unwrap();
-        text.push_str(r#"{"time":"2026-11-2"#);
-        fs::write(&path, text).unwrap();
-        assert_eq!(verify(&path, None).unwrap().incomplete, 1);
-        let mut file = LogFile::open(&path, Limits::default()).unwrap();
-        let entry = Entry::new("console", "another act", Outcome::Allowed);
-        file.append(&entry).unwrap();
-        let verified = verify(&path, None).unwrap();
-        assert_eq!((verified.incomplete, verified.last), (1, 3));
-        edit(&path, |lines| lines[2].push('x'));
-        assert!(broken(&path).starts_with("audit.jsonl:3: this is no line"));
+    fn after_a_crash_at_any_octet_the_log_goes_on_and_only_the_torn_line_is_told() {
+        let add = |path: &Path| {
+            let mut file = LogFile::open(path, Limits { file: 600, kept: 9 }).unwrap();
+            let entry = Entry::new("console", "another act", Outcome::Allowed);
+            file.append(&entry, |_, _, _| {}).unwrap();
+        };
+        // The current file has three lines, or one, which follows a rotation.
+        for (lines, cut) in [3, 4]
+            .into_iter()
+            .flat_map(|it| (0..700).map(move |cut| (it, cut)))
+        {
+            let (_folder, path) = log(lines);
+            let text = fs::read(&path).unwrap();
+            if cut > text.len() {
+                continue;
+            }
+            fs::write(&path, &text[..cut]).unwrap();
+            // A line that lacks its end alone is whole.
+            let is_torn = cut > 0 && text[cut - 1] != b'\n' && text[cut] != b'\n';
+            let before = verify(&path, None).unwrap();
+            assert_eq!(before.torn.len(), usize::from(is_torn), "cut at {cut}");
+            // The next start is interrupted as well.
+            for interrupted in 0..2 {
+                add(&path);
+                let after = verify(&path, None).unwrap();
+                assert_eq!(after.last, before.last + 1 + interrupted, "cut at {cut}");
+                let torn = usize::from(is_torn) + interrupted as usize;
+                assert_eq!(after.torn.len(), torn, "cut at {cut}");
+                let mut text = fs::read(&path).unwrap();
+                text.extend(&br#"{"time":"2026-11-29T"#[..]);
+                fs::write(&path, text).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn an_interrupted_rotation_loses_nothing() {
+        let (_folder, path) = log(4);
+        let next = path.with_extension("jsonl.2");
+        fs::rename(path.with_extension("jsonl.1"), next).unwrap();
+        assert_eq!(verify(&path, None).unwrap().last, 4);
+        fs::rename(&path, path.with_extension("jsonl.1")).unwrap();
+        assert_eq!(verify(&path, None).unwrap().last, 4);
+        drop(LogFile::open(&path, Limits::default()).unwrap());
+        assert_eq!(verify(&path, None).unwrap().last, 4);
+    }
+
+    #[test]
+    fn a_torn_line_in_place_of_a_whole_one_is_named() {
+        let (_folder, path) = log(3);
+        edit(&path, |lines| lines[1].truncate(20));
+        assert!(broken(&path).starts_with("audit.jsonl:2: this is no line"));
     }
 }

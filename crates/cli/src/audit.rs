@@ -78,6 +78,19 @@ impl TryFrom<String> for Place {
 }
 
 impl AuditFlags {
+    /// Refuses the flag for the file.
+    ///
+    /// # Errors
+    /// If the flag is there.
+    pub(super) fn refuse_flag(&self) -> Result<(), Failure> {
+        match &self.audit {
+            None => Ok(()),
+            Some(_) => Err(Failure::new(
+                "this command answers for no component, so it writes no audit log: omit --audit",
+            )),
+        }
+    }
+
     /// The log that flags or the settings file name; `None` if they name none. It is opened once.
     ///
     /// # Errors
@@ -122,5 +135,44 @@ impl DecisionRecorder for PlainLinks {
 
     fn refuses_commands(&self) -> bool {
         self.0.refuses_commands()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use crate::network::Network;
+
+    #[derive(Parser)]
+    struct Tool {
+        #[command(flatten)]
+        network: Network,
+    }
+
+    #[tokio::test]
+    async fn a_tool_with_the_settings_of_a_service_leaves_it_its_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let [log, settings] = ["audit.jsonl", "node.toml"].map(|it| folder.path().join(it));
+        let table = format!("[audit]\nfile = {:?}\n", log.display().to_string());
+        std::fs::write(&settings, table).unwrap();
+        let start = |further: &[&str]| {
+            let settings = settings.to_str().unwrap();
+            let flags = ["tool", "--loopback", "--group=off", "--config", settings];
+            let tool = Tool::parse_from(flags.iter().chain(further));
+            let (_, config) = tool.network.for_own_node("tool").unwrap();
+            let started = tool.network.start(config.clone());
+            (started, tool.network.start_service(config))
+        };
+        let (tool, service) = start(&[]);
+        assert!(tool.is_ok(), "{:?}", tool.err());
+        assert!(log.exists() && service.is_ok());
+        let (tool, other) = start(&[]);
+        assert!(tool.is_ok(), "{:?}", tool.err());
+        let error = other.err().unwrap().to_string();
+        assert!(error.contains("another program writes to it"), "{error}");
+        let mine = folder.path().join("mine.jsonl");
+        let (tool, _) = start(&["--audit", mine.to_str().unwrap()]);
+        assert!(tool.err().unwrap().to_string().contains("omit --audit"));
     }
 }

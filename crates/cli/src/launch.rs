@@ -41,6 +41,10 @@ pub trait Ready: Args {
         |_: &mut Config| {}
     }
 
+    /// Whether the program has entries of its own for the audit log. The others have those of the links of
+    /// their node, and leave the log to the program whose node they attach to.
+    const AUDITS: bool = false;
+
     /// Takes the audit log of the program, if there is one.
     fn audit(&mut self, _log: Option<AuditLog>) {}
 
@@ -120,7 +124,9 @@ impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
         let for_node = self.flags.for_node();
         let mut flags = self.flags;
-        flags.audit(self.network.audit()?);
+        if F::AUDITS {
+            flags.audit(self.network.audit()?);
+        }
         let mut part = flags.part()?;
         logging::use_level(self.network.log_level()?);
         runtime::run(async {

@@ -155,8 +155,7 @@ impl Network {
         Ok((id, identity, self.with_flags(node, id)?))
     }
 
-    /// For the examination of a node before its start: its id, if one is chosen, and its settings,
-    /// but with a temporary id, such as [`passing_id`].
+    /// For the examination of a node before its start: its id, if chosen, and its settings with another.
     pub fn for_examination(&self, passing: JausId) -> Result<(Option<JausId>, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
@@ -246,7 +245,7 @@ impl Network {
             for_node(&mut config);
             config.validate().map_err(Failure::of)?;
             let config = config.or_any_free_port();
-            let node = self.start_with(config, links)?;
+            let node = self.start_with(config, links, self.audit()?)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;
             return Ok(Place {
                 port,
@@ -308,7 +307,7 @@ impl Network {
         Ok((component, sender, stay))
     }
 
-    /// The settings of the secure link; `None` if neither flags nor the settings file ask for one.
+    /// The settings of the secure link, if flags or the settings file ask for one.
     ///
     /// # Errors
     /// An unreadable file, or an invalid table.
@@ -317,7 +316,7 @@ impl Network {
         self.secure.settings(self.file())
     }
 
-    /// The audit log that flags or the settings file name; `None` if they name none.
+    /// The audit log that flags or the settings file name, if any. Services open it, for no two programs can.
     ///
     /// # Errors
     /// An unreadable settings file, an invalid table, or a log that cannot be written.
@@ -342,18 +341,29 @@ impl Network {
         Ok(())
     }
 
-    /// Starts a node with these settings, and with a secure link if flags or the settings file
-    /// name one.
+    /// Starts a service's node, with a secure link and the audit log if flags or the settings file name them.
     ///
     /// # Errors
-    /// A key or trust file that cannot be used, or a node that cannot be started.
-    pub fn start(&self, config: Config) -> Result<Node, Failure> {
-        self.start_with(config, Vec::new())
+    /// A key, trust file or log that cannot be used, or a node that cannot be started.
+    pub fn start_service(&self, config: Config) -> Result<Node, Failure> {
+        self.start_with(config, Vec::new(), self.audit()?)
     }
 
-    /// The same, with further links.
-    fn start_with(&self, config: Config, links: Vec<Box<dyn CustomLink>>) -> Result<Node, Failure> {
-        let log = self.audit()?;
+    /// The same for a tool. It opens no audit log: a service with the same settings file writes to that.
+    ///
+    /// # Errors
+    /// As [`start_service`](Self::start_service); a flag that names an audit log.
+    pub fn start(&self, config: Config) -> Result<Node, Failure> {
+        self.audit.refuse_flag()?;
+        self.start_with(config, Vec::new(), None)
+    }
+
+    fn start_with(
+        &self,
+        config: Config,
+        links: Vec<Box<dyn CustomLink>>,
+        log: Option<AuditLog>,
+    ) -> Result<Node, Failure> {
         #[cfg(feature = "secure")]
         let (config, links) = match self.secure()? {
             Some(secure) => {

@@ -9,6 +9,7 @@ use jaus::messages::core::{
 use jaus::messages::mobility::SetWrenchEffort;
 use jaus::rights::{CLEAR_ALL, Table};
 use jaus::wire;
+use jaus_audit::Action;
 use jaus_vehicle::messages::ground::{
     ApproveMission, ContinueMission, SetDestination, StopMission,
 };
@@ -293,28 +294,24 @@ impl OperatorRequest {
         }
     }
 
-    /// Its name in the audit log.
-    pub(crate) const fn name(&self) -> &'static str {
+    /// What it does, for the audit log.
+    pub(crate) const fn action(&self) -> Action {
         match self {
-            Self::Select { .. } => "select vehicle",
-            Self::Control { on: true } => "take control",
-            Self::Control { on: false } => "release control",
-            Self::Handover { grant: true, .. } => "hand over control",
-            Self::Handover { grant: false, .. } => "refuse handover",
-            Self::Resume => "resume",
-            Self::Standby => "standby",
-            Self::Emergency { on: true } => "set emergency",
-            Self::Emergency { on: false } => "clear emergency",
-            Self::EmergencyAll { on: true } => "set emergency of all",
-            Self::EmergencyAll { on: false } => "clear emergency of all",
-            Self::ClearAnyEmergency => "clear emergencies of all clients",
-            Self::Drive { .. } => "drive",
-            Self::DriveEnd => "end drive",
-            Self::TakeOver => "take over from mission",
-            Self::Destination { .. } => "plan mission",
-            Self::Approve { .. } => "approve mission",
-            Self::Continue { .. } => "continue mission",
-            Self::Stop => "stop mission",
+            Self::Select { .. } => Action::VehicleSelected,
+            Self::Control { on: true } | Self::TakeOver => Action::ControlRequested,
+            Self::Control { on: false } => Action::ControlReleased,
+            Self::Handover { .. } => Action::HandoverAnswered,
+            Self::Resume => Action::Resume,
+            Self::Standby => Action::Standby,
+            Self::Emergency { on: true } | Self::EmergencyAll { on: true } => Action::EmergencySet,
+            Self::Emergency { on: false }
+            | Self::EmergencyAll { on: false }
+            | Self::ClearAnyEmergency => Action::EmergencyCleared,
+            Self::Drive { .. } | Self::DriveEnd => Action::Drive,
+            Self::Destination { .. } => Action::MissionPlanned,
+            Self::Approve { .. } => Action::MissionApproved,
+            Self::Continue { .. } => Action::MissionContinued,
+            Self::Stop => Action::MissionStopped,
         }
     }
 
@@ -335,7 +332,15 @@ impl OperatorRequest {
             Self::Approve { mission } | Self::Continue { mission } => {
                 Some(format!("mission {mission}"))
             }
-            Self::Handover { operator, .. } => Some(format!("requested by {operator}")),
+            Self::Handover {
+                operator, grant, ..
+            } => {
+                let answer = if *grant { "granted" } else { "refused" };
+                Some(format!("{answer} to {operator}"))
+            }
+            Self::TakeOver => Some("stops the mission".to_owned()),
+            Self::EmergencyAll { .. } => Some("for all vehicles".to_owned()),
+            Self::ClearAnyEmergency => Some("of all clients".to_owned()),
             _ => None,
         }
     }

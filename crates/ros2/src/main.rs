@@ -200,6 +200,7 @@ impl Ready for Flags {
     const ID: JausId = JausId::new(253, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
     const SUBSYSTEM: &'static str = "ROS 2 bridge";
+    const AUDITS: bool = true;
 
     fn part(self) -> Result<impl Part, Failure> {
         self.check_components()?;

@@ -84,6 +84,7 @@ impl Ready for Flags {
     const ID: JausId = JausId::new(251, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
     const SUBSYSTEM: &'static str = "zenoh bridge";
+    const AUDITS: bool = true;
 
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
         |config: &mut Config| config.routing.forward = true

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::rights::Verdict;
+use crate::wire::DataControl;
 
 const FLOOD: u32 = 100_000;
 const SOURCES: u32 = 10_000;
@@ -272,6 +273,53 @@ fn a_flood_of_refusals_does_not_displace_what_was_done() {
     );
     assert_eq!(decided.len(), 257);
     assert!(rig.count(Counter::DecisionsLost) > 0);
+}
+
+#[test]
+fn a_message_is_recorded_when_it_is_delivered_and_once() {
+    let access = Access {
+        grants: vec!["42 control=127 configure".parse().unwrap()],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    rig.endpoint.record_decisions();
+    rig.meet_peer();
+    let asked = Frame {
+        flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
+        ..request_control()
+    };
+    rig.inbox.full = vec![US];
+    rig.hear(&asked);
+    assert_eq!(decisions(&mut rig), [], "there was no room");
+    rig.inbox.full.clear();
+    for _ in 0..3 {
+        rig.pass(Duration::from_millis(100));
+        rig.hear(&asked);
+    }
+    assert_eq!(
+        (rig.received().len(), rig.count(Counter::Duplicate)),
+        (1, 2)
+    );
+    let decided = decisions(&mut rig);
+    assert_eq!(decided.len(), 1, "{decided:?}");
+    assert_eq!(decided[0].1, 1, "repetitions are not delivered");
+    // A large message counts when its last part is there.
+    let parts = [
+        (DataControl::First, &b"\x0D\x00\x64"[..]),
+        (DataControl::Last, b"\x00"),
+    ];
+    for (number, (data, payload)) in parts.into_iter().enumerate() {
+        assert_eq!(decisions(&mut rig), [], "it is not complete");
+        rig.hear(&Frame {
+            flags: Flags::default().with_data(data),
+            sequence: 10 + number as u16,
+            ..from_peer(payload)
+        });
+    }
+    assert_eq!((rig.received().len(), decisions(&mut rig).len()), (1, 1));
 }
 
 #[test]

@@ -86,6 +86,7 @@ impl Ready for Flags {
     const ID: JausId = JausId::new(42, 1, 1);
     const KIND: Kind = Kind::OperatorControlUnit;
     const SUBSYSTEM: &'static str = "Operator";
+    const AUDITS: bool = true;
 
     fn audit(&mut self, log: Option<AuditLog>) {
         self.audit = log;

@@ -185,6 +185,7 @@ impl Ready for Flags {
     const ID: JausId = JausId::new(250, 1, 1);
     const KIND: Kind = Kind::OtherSubsystem;
     const SUBSYSTEM: &'static str = "RA gateway";
+    const AUDITS: bool = true;
 
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
         // RA systems answer only to port 3794, JAUS peers to our source port.

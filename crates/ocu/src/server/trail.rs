@@ -4,7 +4,7 @@
 use std::net::SocketAddr;
 
 use jaus::address::JausId;
-use jaus_audit::{AuditLog, Entry, Outcome};
+use jaus_audit::{Action, AuditLog, Entry, Outcome};
 
 use super::logins::{Ending, Login};
 use crate::request::OperatorRequest;
@@ -36,7 +36,7 @@ impl Trail {
     /// A login by password or token; `None` for success.
     pub(super) fn login(&self, who: &str, address: SocketAddr, refusal: Option<&str>) {
         self.write(|| {
-            let entry = |outcome| Entry::new(who, "login", outcome).address(address.ip());
+            let entry = |outcome| Entry::new(who, Action::Login, outcome).address(address.ip());
             match refusal {
                 None => entry(Outcome::Allowed),
                 Some(why) => entry(Outcome::Refused).because(why),
@@ -49,8 +49,8 @@ impl Trail {
         tracing::info!("the session of {} has ended: {why}", login.user.name);
         self.write(|| {
             let what = match why {
-                Ending::LoggedOut => "logout",
-                _ => "session ended",
+                Ending::LoggedOut => Action::Logout,
+                _ => Action::SessionEnded,
             };
             let entry = Entry::new(&login.user.name, what, Outcome::Allowed);
             entry.address(login.address.ip()).because(why)
@@ -78,7 +78,7 @@ impl Trail {
             } else {
                 Outcome::Refused
             };
-            let entry = Entry::new(user, request.name(), outcome);
+            let entry = Entry::new(user, request.action(), outcome);
             let entry = entry.address(address.ip());
             let entry = match request.vehicle(vehicle) {
                 Some(subsystem) => entry.to(subsystem),

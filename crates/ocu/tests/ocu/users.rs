@@ -275,7 +275,7 @@ async fn one_who_observes_sees_the_vehicle_and_stops_it_and_does_nothing_else() 
         .await;
     let (head, _) = guarded.get("/sessions", &cookie).await;
     assert!(head.starts_with("http/1.1 403"), "{head}");
-    until(|| guarded.has_recorded(&["carl", "take control", "refused", "role drive"])).await;
+    until(|| guarded.has_recorded(&["carl", "control requested", "refused", "role drive"])).await;
 }
 
 #[tokio::test]
@@ -318,8 +318,8 @@ async fn all_pages_see_the_name_of_the_user_who_drives() {
     watching
         .until(|state| state["control"]["user"].is_null())
         .await;
-    until(|| guarded.has_recorded(&["ben", "release control", "allowed"])).await;
-    assert!(guarded.has_recorded(&["ben", "take control", "allowed"]));
+    until(|| guarded.has_recorded(&["ben", "control released", "allowed"])).await;
+    assert!(guarded.has_recorded(&["ben", "control requested", "allowed"]));
 }
 
 #[tokio::test]

@@ -1,6 +1,6 @@
 //! The entries of the audit log about a secure link.
 
-use jaus_audit::{Entry, Outcome};
+use jaus_audit::{Action, Entry, Outcome};
 
 use crate::transport::{Act, Record};
 
@@ -9,11 +9,13 @@ pub(super) fn entry(record: Record) -> Entry {
     let is_stranger = record.peer.is_none();
     let who = record.peer.as_deref().unwrap_or("unknown");
     let entry = match record.act {
-        Act::Connected => Entry::new(who, "connect", Outcome::Allowed),
+        Act::Connected => Entry::new(who, Action::Connect, Outcome::Allowed),
         Act::Disconnected { reason } => {
-            Entry::new(who, "disconnect", Outcome::Allowed).because(reason)
+            Entry::new(who, Action::Disconnect, Outcome::Allowed).because(reason)
         }
-        Act::HandshakeFailed(fault) => Entry::new(who, "connect", Outcome::Refused).because(fault),
+        Act::HandshakeFailed(fault) => {
+            Entry::new(who, Action::Connect, Outcome::Refused).because(fault)
+        }
         Act::DisputedId {
             source,
             destination,
@@ -37,6 +39,6 @@ pub(super) fn entry(record: Record) -> Entry {
 
 /// The entry about records that were not kept.
 pub(super) fn loss(count: u64) -> Entry {
-    let entry = Entry::new("jaus", "audit", Outcome::Failed).times(count);
-    entry.because("not recorded, because too much came at once")
+    let entry = Entry::new("jaus", Action::EntriesLost, Outcome::Failed).times(count);
+    entry.because("too much came at once")
 }

@@ -9,7 +9,7 @@ use jaus_cli::output::{Output, say};
 
 /// Verify audit logs
 ///
-/// Each line of an audit log has a number, and the hash (SHA-256) of the line before it.
+/// Each line of an audit log has a number, and the hash (SHA-256) of the whole line before it.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus audit verify /var/log/jaus/audit.jsonl\n  \
@@ -27,7 +27,8 @@ enum Action {
     ///
     /// The log itself cannot tell whether its last lines were cut off, or its oldest files removed, nor
     /// whether someone wrote all of it anew. For that, note the last number and hash that this command
-    /// prints somewhere else, and compare them later by --noted; or forward the entries to another host.
+    /// prints somewhere else, or forward the entries to another host, and compare them by --noted: each
+    /// forwarded entry has its number and hash. A torn line, such as after a loss of power, is no break.
     Verify(Verify),
 }
 
@@ -37,7 +38,7 @@ struct Verify {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
 
-    /// The last line that an earlier verification has printed: the log must still have it
+    /// The last line that an earlier verification has printed, or a forwarded one: the log must still have it
     #[arg(long, value_name = "NUMBER:HASH")]
     noted: Option<Noted>,
 }
@@ -101,22 +102,23 @@ impl Verify {
 fn tell(output: &mut Output, file: &Path, log: &VerifiedLog) -> Result<(), Failure> {
     let (file, first, last) = (file.display(), log.first, log.last);
     if last == 0 {
-        return output.line(format_args!("{file}: no lines"));
+        output.line(format_args!("{file}: no lines"))?;
+    } else {
+        output.line(format_args!(
+            "{file}: lines {first} to {last} are unchanged; the last is {last}:{}",
+            log.hash
+        ))?;
     }
-    output.line(format_args!(
-        "{file}: lines {first} to {last} are unchanged; the last is {last}:{}",
-        log.hash
-    ))?;
     if first > 1 {
         let before = first - 1;
         output.line(format_args!(
             "{file}: lines 1 to {before} were in older files, which are gone"
         ))?;
     }
-    if log.incomplete > 0 {
-        let incomplete = log.incomplete;
+    for (file, line) in &log.torn {
         output.line(format_args!(
-            "{file}: {incomplete} incomplete lines, where the program was interrupted"
+            "{}:{line}: this line is torn: the program was interrupted while it wrote it",
+            file.display()
         ))?;
     }
     Ok(())

@@ -95,7 +95,7 @@ impl NodeCommand {
         runtime::run(async {
             let levels = LevelRequests::accept(self.network.file());
             let metrics = Metrics::open(self.metrics, identity.metrics).await?;
-            let node = self.network.start(config)?;
+            let node = self.network.start_service(config)?;
             let events = (node.events(), node.component_events());
             let component = Component::builder(kind, name)
                 .attach(&node, id.component())

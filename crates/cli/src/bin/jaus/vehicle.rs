@@ -143,7 +143,7 @@ impl VehicleCommand {
         runtime::run(async {
             let levels = LevelRequests::accept(self.network.file());
             let metrics = Metrics::open(self.metrics, identity.metrics).await?;
-            let node = self.network.start(config)?;
+            let node = self.network.start_service(config)?;
             let time = TimeOfDay::new(time_of_day);
             let vehicle = self.simulation.vehicle().with_clock(time.clone());
             let vehicle = vehicle.motion_policy(self.motion_policy());

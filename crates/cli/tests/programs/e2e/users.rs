@@ -121,7 +121,7 @@ fn says_who_did_what(audit: &Path) {
         .map(|file| std::fs::read_to_string(file).unwrap())
         .concat();
     for words in [
-        ["ben", "take control", "allowed"],
+        ["ben", "control requested", "allowed"],
         ["ben", "session ended", "ended by anna"],
         ["carl", "login", "wrong name or password"],
     ] {

@@ -378,8 +378,8 @@ fn a_key_without_rules_observes_and_both_sides_say_why_it_commands_nothing() {
     let audit = at_vehicle.audit();
     for part in [
         r#""who":"operator","what":"connect","result":"allowed""#,
-        r#""who":"operator","what":"RequestControl","to":"115.1.4","result":"refused","why":"its sender may not take control"#,
-        r#""who":"operator","what":"control","to":"115.1.4","result":"allowed""#,
+        r#""who":"operator","what":"control requested","message":"RequestControl","to":"115.1.4","result":"refused","why":"its sender may not take control"#,
+        r#""who":"operator","what":"control granted","message":"ConfirmControl","to":"115.1.4","result":"allowed""#,
         r#""id":"60.1.1""#,
     ] {
         assert!(audit.contains(part), "{part} in {audit}");
