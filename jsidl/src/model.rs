@@ -104,6 +104,8 @@ pub struct Message {
     /// The right that its sender needs: the attributes `permission`, `authority` and `granted` of our own
     /// namespace. `None` if the definition does not state it.
     pub permission: Option<Permission>,
+    /// Whether all that it does is to stop or end something: the attribute `stops` of our own namespace.
+    pub stops: bool,
     /// The field with the component to which its receiver sends the message behind it, of the messages that
     /// it carries: the attribute `destination` of our own namespace. `None` if the receiver obeys them itself.
     pub destination: Option<String>,

@@ -25,8 +25,8 @@ pub(super) struct Decisions {
 
 impl Endpoint {
     /// Keeps decisions on messages of plain links for [`poll_decision`](Self::poll_decision): refused
-    /// messages, and what concerns control, emergencies and the configuration of components. Secure
-    /// links record their own.
+    /// messages, and what concerns control, emergencies and the configuration of components. Links with
+    /// sessions know who their clients are, and record their own: secure links and the one to zenoh.
     pub fn record_decisions(&mut self) {
         self.decisions.is_recording = true;
     }
@@ -113,7 +113,7 @@ impl Endpoint {
     }
 }
 
-/// Whether the link decides and records itself.
+/// Whether the link has sessions, and so decides and records itself.
 const fn is_session(remote: Remote) -> bool {
     matches!(remote, Remote::Session(_))
 }

@@ -332,7 +332,7 @@ impl Core {
     /// Receives datagrams; returns whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
-        if let Some(Recorder(recorder)) = &self.recorder {
+        if let Some(recorder) = &self.recorder {
             self.endpoint.refuse_commands(recorder.refuses_commands());
         }
         for (&id, link) in &mut self.links.open {
@@ -392,7 +392,7 @@ fn announce(
         awaiting.handle_event(&event);
         events.send(event);
     }
-    if let Some(Recorder(recorder)) = recorder {
-        std::iter::from_fn(|| endpoint.poll_decision()).for_each(|it| recorder.record(it));
+    if let Some(recorder) = recorder {
+        recorder.record_all(std::iter::from_fn(|| endpoint.poll_decision()));
     }
 }

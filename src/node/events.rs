@@ -6,7 +6,8 @@ use std::fmt;
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 
-use crate::endpoint::Decided;
+use crate::endpoint::Remote;
+use crate::rights::Decided;
 
 /// Events kept for a slow listener.
 const KEPT: usize = 256;
@@ -71,19 +72,37 @@ impl<T: Clone> EventSender<T> {
     }
 }
 
-/// Takes the decisions on messages of plain links.
-pub trait DecisionRecorder: Send {
+/// Takes the decisions on messages of clients, such as those of plain links.
+pub trait DecisionRecorder<C = Remote>: Send {
     /// Records a decision. It must not block.
-    fn record(&mut self, decided: Decided);
+    fn record(&mut self, decided: Decided<C>);
 
     /// Whether what changes something is to be refused now, because it could not be recorded.
     fn refuses_commands(&self) -> bool;
 }
 
-/// The recorder of a node.
-pub(super) struct Recorder(pub(super) Box<dyn DecisionRecorder>);
+/// The recorder of a node, or of a program that decides itself what its clients may do.
+pub struct Recorder<C = Remote>(Box<dyn DecisionRecorder<C>>);
 
-impl fmt::Debug for Recorder {
+impl<C> Recorder<C> {
+    /// Wraps a recorder.
+    pub fn new(recorder: impl DecisionRecorder<C> + 'static) -> Self {
+        Self(Box::new(recorder))
+    }
+
+    /// Records decisions.
+    pub fn record_all(&mut self, decisions: impl IntoIterator<Item = Decided<C>>) {
+        decisions.into_iter().for_each(|it| self.0.record(it));
+    }
+
+    /// Whether what changes something is to be refused now, because it could not be recorded.
+    #[must_use]
+    pub fn refuses_commands(&self) -> bool {
+        self.0.refuses_commands()
+    }
+}
+
+impl<C> fmt::Debug for Recorder<C> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Recorder")
     }

@@ -63,8 +63,7 @@ pub use self::config::{
     Config, ConfigError, Delivery, LocalUser, LocalUserError, PeerAddress, Tcp, units,
 };
 pub use self::error::{HostError, SendError, StartError, Undelivered};
-use self::events::Recorder;
-pub use self::events::{DecisionRecorder, EventStream};
+pub use self::events::{DecisionRecorder, EventStream, Recorder};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
@@ -332,9 +331,9 @@ impl Node {
 
     /// From now on, passes each decision on a message of a plain link to a recorder, for an audit log:
     /// refused messages, and what concerns control, emergencies and the configuration of components.
-    /// Secure links record their own. It replaces an earlier recorder.
+    /// Links with sessions record their own. It replaces an earlier recorder.
     pub fn record_decisions(&self, recorder: impl DecisionRecorder + 'static) {
-        let recorder = Recorder(Box::new(recorder));
+        let recorder = Recorder::new(recorder);
         self.shared().lock().record_decisions(recorder);
     }
 

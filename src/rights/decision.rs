@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use bytes::Bytes;
-
 use super::carried::{self, Carried};
 use super::{Permission, Refusal, Rules, Table, Unaccepted, is_later, is_recorded, table};
 use crate::address::JausId;
@@ -16,11 +14,17 @@ use crate::wire::{Flags, Frame};
 
 /// Names of carried messages that a decision lists. Further ones are counted.
 const MOST_NAMES: usize = 4;
-/// The code of Request Handoff, by which control is requested from the client that has it. Its set is
-/// optional here.
-const REQUEST_HANDOFF: u16 = 0xFF31;
-/// Confirm Handoff Request (FF35h) about request 0, with the response code for insufficient authority.
-const HANDOFF_DENIED: &[u8] = &[0x35, 0xFF, 0, 6];
+/// The requests for control that are answered, with their answers and the response code for insufficient
+/// authority: those of Access Control (AS5710A) and of Handoff (RAS-G interoperability profiles), whose
+/// set is optional here.
+const DENIALS: [(&str, &str, u8); 2] = [
+    (
+        RequestControl::NAME,
+        ConfirmControl::NAME,
+        ResponseCode::INSUFFICIENT_AUTHORITY.0,
+    ),
+    ("RequestHandoff", "ConfirmHandoffRequest", 6),
+];
 
 /// What was decided about one message.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -223,11 +227,14 @@ fn begins(frame: &Frame) -> bool {
     !is_later(frame) && !frame.is_acknowledgement()
 }
 
-/// Checks a frame while nothing can be recorded: what only queries, ends or stops, passes.
+/// Checks a frame while nothing can be recorded: what only queries, ends or stops ([`Table::stops`]), passes.
 ///
 /// # Errors
 /// [`Refusal::Unrecorded`].
 pub fn check_unrecorded(frame: &Frame, table: &Table) -> Result<(), Refusal> {
+    if begins(frame) && table.stops(&frame.payload) {
+        return Ok(());
+    }
     let checked = Rules::default().check(frame, table);
     checked.map_err(|_| Refusal::Unrecorded)
 }
@@ -240,16 +247,13 @@ pub fn denial(refused: &Frame) -> Option<Frame> {
     if !refused.destination.is_unicast() || !begins(refused) {
         return None;
     }
-    let payload = match refused.code()? {
-        RequestControl::CODE => {
-            let confirm = ConfirmControl {
-                response_code: ResponseCode::INSUFFICIENT_AUTHORITY,
-            };
-            confirm.encode().ok()?
-        }
-        REQUEST_HANDOFF => Bytes::from_static(HANDOFF_DENIED),
-        _ => return None,
-    };
+    let (table, code) = (Table::default(), refused.code()?);
+    let payload = DENIALS.iter().find_map(|(request, answer, decision)| {
+        let is_request = table.names(code).iter().any(|it| it == request);
+        is_request
+            .then(|| table.answer(answer, *decision))
+            .flatten()
+    })?;
     Some(Frame {
         version: refused.version,
         flags: Flags::new(refused.flags.priority()),
@@ -259,6 +263,8 @@ pub fn denial(refused: &Frame) -> Option<Frame> {
 
 #[cfg(test)]
 mod tests {
+    use bytes::Bytes;
+
     use super::*;
 
     const OPERATOR: JausId = JausId::new(60, 1, 1);
@@ -408,7 +414,7 @@ mod tests {
         };
         assert_eq!(answer(REQUEST).as_deref(), Some(&b"\x0F\x00\x02"[..]));
         let handoff = answer(b"\x31\xFF\x64\x00");
-        assert_eq!(handoff.as_deref(), Some(HANDOFF_DENIED));
+        assert_eq!(handoff.as_deref(), Some(&b"\x35\xFF\x00\x06"[..]));
         assert_eq!(answer(SHUTDOWN), None);
         let to_all = Frame {
             destination: JausId::EVERYONE,

@@ -39,9 +39,9 @@
 //! # Groups
 //!
 //! A message to a group of ids (with wildcards) that is wider than `with`: a command is refused, a query
-//! passes. What ends or stops (Set Emergency, Release Control) goes to those of the group that are in `with`,
-//! and to no others: a stop does not fail for lack of a right, and does not reach the vehicles of others. See
-//! [`Rules::admit`].
+//! passes. What only stops or ends (Set Emergency, Release Control, Standby: [`Table::stops`]) goes to those of
+//! the group that are in `with`, and to no others: a stop does not fail because it is for a group, and does not
+//! reach the vehicles of others. See [`Rules::admit`].
 //!
 //! # Codes with several meanings
 //!
@@ -219,11 +219,7 @@ impl Rules {
         }
         let depth = 0;
         self.check_message(&frame.payload, Within { table, to, depth })?;
-        let ends_or_stops = || {
-            let mut needs = table.needs(&frame.payload);
-            needs.any(Permission::ends_or_stops)
-        };
-        if self.covers(to) || !ends_or_stops() {
+        if self.covers(to) || !table.stops(&frame.payload) {
             return Ok(Admitted::Whole);
         }
         if frame.flags.data() != DataControl::Single {
@@ -276,10 +272,8 @@ impl Rules {
         message: &[u8],
         Within { table, depth, .. }: Within<'_>,
     ) -> Result<(), Refusal> {
-        let is_end = |it| matches!(it, Permission::Emergency | Permission::Release);
-        let ends = table.knows(code) && table.needs(message).all(is_end);
         // A mistake in a name must not keep a stop back.
-        if !ends && self.except.has_unknown(table) {
+        if !table.stops(message) && self.except.has_unknown(table) {
             return Err(Refusal::UnknownName);
         }
         let concerns = |permission: Permission| match permission {
@@ -354,12 +348,12 @@ struct Within<'t> {
     depth: usize,
 }
 
-/// Whether a message may be for ids some of which its sender may not reach. What is free may; but what ends
-/// or stops something must be narrowed, which nobody can do inside of another message.
+/// Whether a message may be for ids some of which its sender may not reach. What changes nothing may; and what
+/// stops something, because it is narrowed then, which nobody can do inside of another message.
 fn may_be_wide(message: &[u8], Within { table, depth, .. }: Within<'_>) -> bool {
-    let may_be = |it: Permission| it.needs_no_right() && (depth == 0 || !it.ends_or_stops());
     let mut needs = table.needs(message).peekable();
-    needs.peek().is_some() && needs.all(may_be)
+    let changes_nothing = needs.peek().is_some() && needs.all(Permission::changes_nothing);
+    changes_nothing || (depth == 0 && table.stops(message))
 }
 
 /// To which ids an admitted frame may go.

@@ -5,6 +5,8 @@ use std::fmt::{self, Write as _};
 use std::num::ParseIntError;
 use std::sync::{Arc, LazyLock};
 
+use bytes::Bytes;
+
 use super::carried::{self, Carried, Layout};
 
 /// Of all definitions of the catalogue, whatever sets this library was built with.
@@ -20,6 +22,9 @@ static CATALOGUE: LazyLock<Table> = LazyLock::new(|| {
 /// The code of Clear Emergency (0007h) by which a client clears the emergencies of all clients. The
 /// standard reserves it.
 pub const CLEAR_ALL: u16 = 0xFFFF;
+
+/// The word of a line by which all messages with its code stop or end something and do nothing else.
+const STOPS: &str = "stops";
 
 /// The right that the sender of a message needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,16 +71,12 @@ impl Permission {
 
     /// Whether an audit log holds each message that needs it.
     pub(super) const fn is_recorded(self) -> bool {
-        !matches!(
-            self,
-            Self::Observe | Self::Answer { .. } | Self::Command | Self::Carry
-        )
+        !self.changes_nothing() && !matches!(self, Self::Command | Self::Carry)
     }
 
-    /// Whether it ends or stops something: then a message to a group must reach those of the group that
-    /// its sender may reach, and no others.
-    pub(super) const fn ends_or_stops(self) -> bool {
-        matches!(self, Self::Release | Self::Emergency)
+    /// Whether it changes nothing, so that it may go to all of a group.
+    pub(super) const fn changes_nothing(self) -> bool {
+        matches!(self, Self::Observe | Self::Answer { .. })
     }
 
     fn of(word: &str) -> Option<Self> {
@@ -143,6 +144,8 @@ struct Row {
     /// The sender must have all of these rights, one of each kind of message with this code.
     needs: Vec<Need>,
     names: Vec<String>,
+    /// Whether all messages with this code stop or end something and do nothing else.
+    stops: bool,
     carries: Vec<Layout>,
 }
 
@@ -261,6 +264,38 @@ impl Table {
         }
     }
 
+    /// Whether all that a message does is to stop or end something: every message with its code, and each one
+    /// that it carries. Its sender needs the right to it nevertheless.
+    #[must_use]
+    pub fn stops(&self, message: &[u8]) -> bool {
+        self.stops_within(message, carried::DEEPEST)
+    }
+
+    fn stops_within(&self, message: &[u8], depth: usize) -> bool {
+        let carried = match self.carried(message) {
+            Carried::Messages(carried) if carried.is_empty() || depth > 0 => carried,
+            // What cannot be told may move something.
+            _ => return false,
+        };
+        let mut carried = carried.into_iter();
+        self.row(message).is_some_and(|row| row.stops)
+            && carried.all(|inner| self.stops_within(inner.octets, depth - 1))
+    }
+
+    /// The answer with this name by which a component says how it decides on a request for control: `None` if
+    /// no definition has it. Octets other than the decision are 0.
+    pub(super) fn answer(&self, name: &str, decision: u8) -> Option<Bytes> {
+        self.codes_of(name).into_iter().find_map(|code| {
+            let needs = &self.0.messages.get(&code)?.needs;
+            let is_answer = |need: &&Need| matches!(need.right, Permission::Answer { .. });
+            let place = needs.iter().find(is_answer)?.place?;
+            let mut answer = vec![0; place + 1];
+            answer.get_mut(..2)?.copy_from_slice(&code.to_le_bytes());
+            *answer.get_mut(place)? = decision;
+            Some(answer.into())
+        })
+    }
+
     /// The name of a message for people, or its code.
     #[must_use]
     pub fn name_of(&self, message: &[u8]) -> String {
@@ -336,6 +371,8 @@ impl Known {
         let needs = words.next()?.split(',').map(Need::read);
         let needs = needs.collect::<Option<_>>()?;
         let names: Vec<_> = words.next()?.split(',').map(str::to_owned).collect();
+        let mut words = words.peekable();
+        let stops = words.next_if_eq(&STOPS).is_some();
         let carries = words.map(Layout::parse).collect::<Option<_>>()?;
         if origin == Origin::Further {
             names.iter().for_each(|name| self.name(name, &[code]));
@@ -343,6 +380,7 @@ impl Known {
         let row = Row {
             needs,
             names,
+            stops,
             carries,
         };
         self.add(code, row);
@@ -361,6 +399,7 @@ impl Known {
         };
         add_new(&mut known.needs, row.needs);
         add_new(&mut known.names, row.names);
+        known.stops &= row.stops;
         add_new(&mut known.carries, row.carries);
     }
 }

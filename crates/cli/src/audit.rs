@@ -1,12 +1,15 @@
 //! Flags and settings of the audit log, which all parts of a program share.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use clap::{Args, ValueEnum};
-use jaus::endpoint::{Decided, Remote};
-use jaus::node::DecisionRecorder;
-use jaus_audit::{AuditLog, AuditSettings, Entry, ForwardError, ForwardTo, Unwritable};
+use jaus::endpoint::Remote;
+use jaus::node::{DecisionRecorder, Recorder};
+use jaus::rights::Decided;
+pub use jaus_audit::AuditLog;
+use jaus_audit::{AuditSettings, Entry, ForwardError, ForwardTo, Unwritable};
 use jaus_limits::quota_address;
 use serde::Deserialize;
 
@@ -123,7 +126,7 @@ impl AuditFlags {
 pub(super) struct PlainLinks(pub(super) AuditLog);
 
 impl DecisionRecorder for PlainLinks {
-    fn record(&mut self, decided: Decided) {
+    fn record(&mut self, decided: Decided<Remote>) {
         // Nobody has proved who sent it.
         let entry = Entry::of("plain link", &decided.decision).times(decided.times);
         self.0.write(match decided.client {
@@ -135,6 +138,31 @@ impl DecisionRecorder for PlainLinks {
 
     fn refuses_commands(&self) -> bool {
         self.0.refuses_commands()
+    }
+}
+
+/// A recorder of a program that decides itself what its clients may do: they are named with their kind,
+/// such as `RA 20.1.70.1`.
+#[must_use]
+pub fn recorder<C: Display + 'static>(log: AuditLog, kind: &'static str) -> Recorder<C> {
+    Recorder::new(Clients { log, kind })
+}
+
+/// The records of the clients of a program in the log.
+struct Clients {
+    log: AuditLog,
+    kind: &'static str,
+}
+
+impl<C: Display> DecisionRecorder<C> for Clients {
+    fn record(&mut self, decided: Decided<C>) {
+        let who = format_args!("{} {}", self.kind, decided.client);
+        let entry = Entry::of(who, &decided.decision).times(decided.times);
+        self.log.write(entry);
+    }
+
+    fn refuses_commands(&self) -> bool {
+        self.log.refuses_commands()
     }
 }
 

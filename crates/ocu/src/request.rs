@@ -234,12 +234,17 @@ impl OperatorRequest {
         )
     }
 
-    /// Whether it ends what moves a vehicle or controls it.
-    pub(crate) const fn is_end(&self) -> bool {
-        matches!(
-            self,
-            Self::Control { on: false } | Self::Standby | Self::DriveEnd | Self::Stop
-        )
+    /// Whether it only ends what moves a vehicle or controls it.
+    pub(crate) fn is_end(&self) -> bool {
+        let table = Table::default();
+        match self {
+            // What it needs is the right to begin them.
+            Self::Control { on: false } | Self::DriveEnd => true,
+            other => {
+                let messages = other.messages(0);
+                !messages.is_empty() && messages.iter().all(|it| table.stops(it))
+            }
+        }
     }
 
     /// The least role that may send the messages to which it leads.
@@ -470,6 +475,30 @@ mod tests {
             ..MessageFilter::default()
         };
         assert_eq!(frame.said, Said::Messages { on: true, filter });
+    }
+
+    #[test]
+    fn only_what_stops_or_ends_is_no_change() {
+        use OperatorRequest as Request;
+        for ends in [
+            Request::Control { on: false },
+            Request::Standby,
+            Request::DriveEnd,
+            Request::Stop,
+            Request::Emergency { on: true },
+        ] {
+            assert!(ends.is_end(), "{ends:?}");
+        }
+        for changes in [
+            Request::Control { on: true },
+            Request::Resume,
+            Request::TakeOver,
+            Request::Continue { mission: 1 },
+            Request::Emergency { on: false },
+            Request::ClearAnyEmergency,
+        ] {
+            assert!(!changes.is_end(), "{changes:?}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::rights::{Rules, Table};
+use jaus_cli::audit::{AuditLog, recorder};
 use jaus_cli::runtime::{between, duration_within};
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ros2::bridge::vehicle::Selection;
@@ -112,6 +113,10 @@ struct Flags {
     /// Publish all reports that a query answers, but those about the network itself
     #[arg(long)]
     all_reports: bool,
+
+    /// What the publishers of ROS may and may not do.
+    #[arg(skip)]
+    audit: Option<AuditLog>,
 }
 
 /// Parses the domain. ROS takes an empty `ROS_DOMAIN_ID` as 0, too.
@@ -202,13 +207,25 @@ impl Ready for Flags {
     const SUBSYSTEM: &'static str = "ROS 2 bridge";
     const AUDITS: bool = true;
 
+    fn audit(&mut self, log: Option<AuditLog>) {
+        self.audit = log;
+    }
+
     fn part(self) -> Result<impl Part, Failure> {
         self.check_components()?;
         if let Some(rules) = &self.rights {
             rules.verify(&Table::default()).map_err(Failure::of)?;
         }
+        match self.rights.as_ref().is_none_or(Rules::only_watch) {
+            true => tracing::info!(
+                "ROS may look, and neither command nor stop; --rights gives rights, such as \"observe\" to stop"
+            ),
+            false => tracing::info!("ROS may do what --rights gives it"),
+        }
         let reports = self.reports()?;
-        Bridge::new(self.settings(), self.topics(), reports, &self.session()).map_err(Failure::of)
+        let bridge = Bridge::new(self.settings(), self.topics(), reports, &self.session());
+        let recorder = self.audit.map(|log| recorder(log, "ROS publisher"));
+        Ok(bridge.map_err(Failure::of)?.recorded_by(recorder))
     }
 }
 

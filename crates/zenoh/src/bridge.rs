@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use jaus::link::custom::CustomLink;
-use jaus::node::{Node, now};
+use jaus::node::{Node, Recorder, now};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
@@ -33,7 +33,7 @@ const RENEWAL: Duration = Duration::from_secs(1);
 /// # async fn example() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut network = NetworkSettings::default();
 /// network.connect.push("tcp/192.168.7.2:7447".to_owned());
-/// let mut bridge = Bridge::new(Settings::default(), &network)?;
+/// let mut bridge = Bridge::new(Settings::default(), &network, None)?;
 /// let mut config = Config::new(101, 250);
 /// config.routing.forward = true;
 /// let node = Node::start_with(config, bridge.links())?;
@@ -49,11 +49,16 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// A bridge with these settings. It connects when it runs.
+    /// A bridge with these settings. It connects when it runs. The recorder takes what it decides on messages
+    /// of other bridges, for an audit log.
     ///
     /// # Errors
     /// Settings that zenoh cannot use, or ids with rights on a network that proves nobody's identity.
-    pub fn new(settings: Settings, network: &NetworkSettings) -> Result<Self, NetworkError> {
+    pub fn new(
+        settings: Settings,
+        network: &NetworkSettings,
+        recorder: Option<Recorder<BridgeId>>,
+    ) -> Result<Self, NetworkError> {
         let id = BridgeId::random();
         let mut network = network.clone();
         // So that its keys tell which session of the network it is.
@@ -63,7 +68,7 @@ impl Bridge {
             check_network(&config, settings.trusts_network)?;
         }
         let exchange = Exchange::new(id, settings);
-        let shared = Arc::new(Shared::new(exchange));
+        let shared = Arc::new(Shared::new(exchange, recorder));
         Ok(Self { shared, config })
     }
 
@@ -175,7 +180,7 @@ mod tests {
         };
         let mut network = NetworkSettings::default();
         network.connect.push("tcp/127.0.0.1:7447".to_owned());
-        Bridge::new(settings, &network)
+        Bridge::new(settings, &network, None)
     }
 
     #[test]

@@ -33,5 +33,6 @@ jaus::counters! {
     TooLate = "not sent: waited more than a second for the zenoh network",
     QueueFull = "not sent: zenoh network too slow",
     PeriodTableFull = "messages published without their minimum period, because its table is full",
+    DecisionsLost = "decisions not recorded",
     ViewsRefused = "requests for views that were refused",
 }

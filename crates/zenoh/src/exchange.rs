@@ -4,6 +4,7 @@
 //! side, and it enters only if its source belongs to the bridge that publishes it and not to this
 //! side. So there are no loops, however many bridges join the same two networks.
 
+mod decided;
 mod presence;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,10 +13,10 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message as _;
-use jaus::endpoint::{Remote, To, Transmit};
+use jaus::endpoint::{Remote, SessionId, To, Transmit};
 use jaus::link::custom::Arrival;
 use jaus::messages::core::QueryIdentification;
-use jaus::rights::{Acceptance, Refusal, Table, Unaccepted, denial};
+use jaus::rights::{Acceptance, DecisionQueue, Table};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
 
 use crate::arrivals::Arrivals;
@@ -47,6 +48,9 @@ pub struct Settings {
 
 /// How long a component belongs to this side after it was last heard.
 const LOCAL_FOR: Duration = Duration::from_secs(10);
+/// How long the id of a silent component stays with this side, unless `accept` gives it rights and so says that
+/// it may come from the zenoh side: nobody takes an id because its component is off for a while.
+const HELD_FOR: Duration = Duration::from_secs(600);
 /// The largest payload: a UDP datagram.
 const LARGEST: usize = 65_507;
 
@@ -86,6 +90,8 @@ pub struct Exchange {
     remotes: Remotes,
     /// The components of this side.
     locals: BTreeMap<JausId, Local>,
+    /// Those that are silent, and since when: their ids still belong to this side.
+    silent: BTreeMap<JausId, Instant>,
     /// Their subsystems, whose views this bridge serves.
     served: BTreeSet<u16>,
     thinner: Thinner,
@@ -98,6 +104,9 @@ pub struct Exchange {
     intruders: Notices<(JausId, BridgeId)>,
     /// The bridges that were logged because a component belongs to them.
     owners: Notices<(JausId, BridgeId)>,
+    /// Whether what cannot be recorded is refused.
+    is_refusing: bool,
+    decisions: DecisionQueue<BridgeId>,
     counters: Counters,
 }
 
@@ -113,6 +122,7 @@ impl Exchange {
             offer: settings.offer,
             remotes: Remotes::default(),
             locals: BTreeMap::new(),
+            silent: BTreeMap::new(),
             served: BTreeSet::new(),
             thinner: Thinner::new(&settings.min_periods),
             queue: Queue::default(),
@@ -121,6 +131,8 @@ impl Exchange {
             refused: Notices::default(),
             intruders: Notices::default(),
             owners: Notices::default(),
+            is_refusing: false,
+            decisions: DecisionQueue::default(),
             counters: Counters::default(),
         }
     }
@@ -209,24 +221,13 @@ impl Exchange {
         if frame.source != source || Label::of(&frame) != Some(label) {
             return Err(Counter::KeyMismatch);
         }
-        if self.is_local(now, source) {
-            return Err(Counter::OwnId);
-        }
-        let admitted = self.accept.admit(&frame, &self.table);
-        if admitted == Err(Unaccepted::Source) {
-            return Err(Counter::NotAccepted);
-        }
-        let session = self.remotes.hear(from, source);
-        let session = session.inspect_err(|_| self.note_intruder(now, key, source, from))?;
-        let admitted = match admitted {
-            Ok(admitted) => admitted,
-            Err(Unaccepted::Rule(refusal)) => {
-                self.refuse(now, from, &frame, refusal);
-                return Err(Counter::RuleForbids);
+        let session = self.speaker(now, source, from).inspect_err(|counter| {
+            self.record_intruder(from, &frame);
+            if matches!(counter, Counter::NotAnnounced | Counter::OtherBridge) {
+                self.note_intruder(now, key, source, from);
             }
-            Err(Unaccepted::Source) => return Err(Counter::NotAccepted),
-        };
-        let datagrams = match admitted.copies(&frame) {
+        })?;
+        let datagrams = match self.decide(now, from, &frame)?.copies(&frame) {
             Some(copies) => copies
                 .iter()
                 .filter_map(|it| judp::encode(it).ok())
@@ -242,30 +243,38 @@ impl Exchange {
         Ok(())
     }
 
-    /// Logs a refusal, and answers a request for control.
-    fn refuse(&mut self, now: Instant, from: BridgeId, frame: &Frame, refusal: Refusal) {
-        let code = frame.code().unwrap_or_default();
-        if self.refused.is_due(now, (frame.source, code)) {
-            let (source, destination) = (frame.source, frame.destination);
-            let reason = remedy(refusal, "the rights of its --accept");
-            tracing::warn!("{code:04X}h from {source} to {destination} refused: {reason}");
+    /// The session of a bridge that speaks for a component.
+    fn speaker(
+        &self,
+        now: Instant,
+        component: JausId,
+        bridge: BridgeId,
+    ) -> Result<SessionId, Counter> {
+        if self.is_held(now, component) {
+            return Err(Counter::OwnId);
         }
-        if let Some(denial) = denial(frame)
-            && self.locals.contains_key(&denial.source)
-        {
-            self.publish(now, &denial, None, Recipient::Bridge(from));
+        if !self.accept.accepts(component) {
+            return Err(Counter::NotAccepted);
         }
+        self.remotes.hear(bridge, component)
     }
 
+    /// Whether a component of this side was heard lately.
     fn is_local(&self, now: Instant, id: JausId) -> bool {
-        let is_recent = |local: &Local| now.saturating_duration_since(local.heard) < LOCAL_FOR;
-        self.locals.get(&id).is_some_and(is_recent)
+        let local = self.locals.get(&id);
+        local.is_some_and(|local| is_recent(now, local.heard))
+    }
+
+    /// Whether an id belongs to this side: its component was heard lately, or is silent, but no rule lets the id
+    /// come from the zenoh side.
+    fn is_held(&self, now: Instant, id: JausId) -> bool {
+        let is_kept = |since: &Instant| now.saturating_duration_since(*since) < HELD_FOR;
+        self.is_local(now, id) || self.silent.get(&id).is_some_and(is_kept)
     }
 
     /// Notes a component of this side: `heard` is when its latest message arrived, or now if it is attached to the node.
     pub fn handle_local(&mut self, now: Instant, id: JausId, heard: Instant) {
-        let is_recent = now.saturating_duration_since(heard) < LOCAL_FOR;
-        if !is_recent || !self.offers(id) {
+        if !is_recent(now, heard) || !self.offers(id) {
             return;
         }
         match self.remotes.owner(id) {
@@ -289,6 +298,7 @@ impl Exchange {
         if self.locals.len() >= MOST_OF_BRIDGE {
             return Err(Counter::LocalTableFull);
         }
+        self.silent.remove(&id);
         self.locals.insert(id, Local { heard, call: None });
         self.queue.declare(Command::Announce(id));
         if self.served.insert(id.subsystem()) {
@@ -358,6 +368,7 @@ impl Exchange {
             return Err(Counter::NotConnected);
         }
         let to = self.recipient(frame.destination, to)?;
+        self.record_answer(frame, to);
         self.publish(now, frame, octets, to);
         Ok(())
     }
@@ -461,6 +472,18 @@ impl Exchange {
             }
             self.locals.remove(&id);
             self.queue.declare(Command::Withdraw(id));
+            if self.accept.trusts(id) {
+                self.release(now, id);
+            } else if self.silent.len() < MOST_OF_BRIDGE {
+                self.silent.insert(id, now);
+            }
+        }
+        let silent = std::mem::take(&mut self.silent);
+        let is_kept =
+            |&(_, since): &(JausId, Instant)| now.saturating_duration_since(since) < HELD_FOR;
+        let (kept, over): (Vec<_>, Vec<_>) = silent.into_iter().partition(is_kept);
+        self.silent = kept.into_iter().collect();
+        for (id, _) in over {
             self.release(now, id);
         }
         self.repeat_calls(now);
@@ -495,6 +518,11 @@ impl Exchange {
     }
 }
 
+/// Whether a component that was heard then still counts as present.
+fn is_recent(now: Instant, heard: Instant) -> bool {
+    now.saturating_duration_since(heard) < LOCAL_FOR
+}
+
 /// The frame of a datagram that holds exactly one, with the AS5669A header.
 fn only_frame(payload: &Bytes) -> Option<Frame> {
     if payload.len() > LARGEST {
@@ -511,24 +539,6 @@ fn only_frame(payload: &Bytes) -> Option<Frame> {
 fn waits(frame: &Frame) -> bool {
     frame.flags.acknowledgement() != Acknowledgement::None
         || frame.flags.data() != DataControl::Single
-}
-
-/// Why rights forbid a message, with the remedy; `rights` is where they are, such as `--allow`.
-#[must_use]
-pub fn remedy(refusal: Refusal, rights: &str) -> String {
-    let remedy = |right: &str| format!("add {right} to {rights}");
-    match refusal {
-        Refusal::Command => remedy("`command` or `control=AUTHORITY`"),
-        Refusal::Control => remedy("`control=AUTHORITY`"),
-        Refusal::ClearEmergency => remedy("`clear-emergency`"),
-        Refusal::ClearAnyEmergency => remedy("`clear-emergency=any`"),
-        Refusal::Configure => remedy("`configure`"),
-        Refusal::Authority { asked, most } => {
-            format!("authority {asked}, but at most {most} by {rights}")
-        }
-        Refusal::Unknown => remedy("`also=` and its code"),
-        _ => format!("not allowed by {rights}"),
-    }
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ mod view;
 
 pub use bridge::Bridge;
 pub use counters::{Counter, Counters};
-pub use exchange::{Exchange, Settings, remedy};
+pub use exchange::{Exchange, Settings};
 pub use link::ZenohLink;
 pub use network::{NetworkError, NetworkSettings, open_session};
 pub use proof::check as check_proof;

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 use jaus::counters::Count;
 use jaus::endpoint::Transmit;
 use jaus::link::custom::{Arrival, CustomLink};
+use jaus::node::Recorder;
 use zenoh::query::Query;
 
 use crate::exchange::Exchange;
+use crate::key::BridgeId;
 
 /// The name of the link in logs and reports.
 pub(crate) const NAME: &str = "zenoh";
@@ -32,6 +34,8 @@ pub(crate) struct Shared {
 #[derive(Debug)]
 pub(crate) struct State {
     pub(crate) exchange: Exchange,
+    /// Takes the decisions of the exchange.
+    recorder: Option<Recorder<BridgeId>>,
     /// The answers that wait for the session's thread. As many as there are requests, at most.
     pub(crate) answers: Vec<Answer>,
     /// Wakes the node's task.
@@ -48,11 +52,28 @@ pub(crate) struct Answer {
     pub(crate) result: Result<String, String>,
 }
 
+impl State {
+    /// Changes the exchange, and records what it decides.
+    fn change<T>(&mut self, change: impl FnOnce(&mut Exchange) -> T) -> T {
+        if let Some(recorder) = &self.recorder {
+            self.exchange.refuse_commands(recorder.refuses_commands());
+        }
+        let result = change(&mut self.exchange);
+        let decisions = std::iter::from_fn(|| self.exchange.poll_decision());
+        match &mut self.recorder {
+            Some(recorder) => recorder.record_all(decisions),
+            None => decisions.for_each(drop),
+        }
+        result
+    }
+}
+
 impl Shared {
-    pub(crate) fn new(exchange: Exchange) -> Self {
+    pub(crate) fn new(exchange: Exchange, recorder: Option<Recorder<BridgeId>>) -> Self {
         Self {
             state: Mutex::new(State {
                 exchange,
+                recorder,
                 answers: Vec::new(),
                 waker: None,
                 is_closing: false,
@@ -69,7 +90,7 @@ impl Shared {
     /// Changes the exchange, and wakes the tasks that act on it.
     pub(crate) fn with<T>(&self, change: impl FnOnce(&mut Exchange) -> T) -> T {
         let mut state = self.lock();
-        let result = change(&mut state.exchange);
+        let result = state.change(change);
         let waker = state.waker.take();
         drop(state);
         self.work.notify_one();
@@ -119,7 +140,8 @@ impl CustomLink for ZenohLink {
 
     fn transmit(&mut self, transmit: &Transmit) {
         let now = jaus::node::now();
-        self.shared.lock().exchange.transmit(now, transmit);
+        let mut state = self.shared.lock();
+        state.change(|exchange| exchange.transmit(now, transmit));
     }
 
     fn poll_flush(&mut self, _: &mut Context<'_>, now: Instant) -> Poll<()> {

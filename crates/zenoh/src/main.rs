@@ -8,6 +8,7 @@ use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::Config;
 use jaus::rights::{Acceptance, Grant};
+use jaus_cli::audit::{AuditLog, recorder};
 use jaus_cli::permissions::table_with;
 use jaus_cli::{Failure, Ready, launch};
 use jaus_vehicle::parts::Part;
@@ -63,6 +64,10 @@ struct Flags {
     /// The newest value always arrives. Messages that are acknowledged are never held back.
     #[arg(long, value_name = "MESSAGE=PERIOD")]
     min_period: Vec<MinPeriod>,
+
+    /// What clients of the zenoh side may and may not do.
+    #[arg(skip)]
+    audit: Option<AuditLog>,
 }
 
 /// Parses a subsystem's number or ids with wildcards.
@@ -90,6 +95,10 @@ impl Ready for Flags {
         |config: &mut Config| config.routing.forward = true
     }
 
+    fn audit(&mut self, log: Option<AuditLog>) {
+        self.audit = log;
+    }
+
     fn part(self) -> Result<impl Part, Failure> {
         let mut settings = Settings::default();
         settings.prefix = self.prefix;
@@ -99,6 +108,13 @@ impl Ready for Flags {
             let names = settings.accept.verify(&settings.table);
             names.map_err(Failure::of)?;
         }
+        match settings.accept.only_watches() {
+            true => tracing::info!(
+                "clients of the zenoh side may look, and neither command nor stop; --accept gives rights, such \
+                 as \"60 observe\" to stop"
+            ),
+            false => tracing::info!("clients of the zenoh side may do what --accept gives them"),
+        }
         settings.trusts_network = self.trust_network;
         settings.offer = self.offer;
         settings.min_periods = self.min_period;
@@ -106,7 +122,8 @@ impl Ready for Flags {
         network.file = self.zenoh_config;
         network.connect = self.connect;
         network.listen = self.listen;
-        Bridge::new(settings, &network).map_err(Failure::of)
+        let recorder = self.audit.map(|log| recorder(log, "zenoh bridge"));
+        Bridge::new(settings, &network, recorder).map_err(Failure::of)
     }
 }
 

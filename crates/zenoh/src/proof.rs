@@ -1,7 +1,7 @@
 //! Whether the links of a zenoh session prove who is at their other end.
 
 use serde_json::Value;
-use zenoh::config::Config;
+use zenoh::config::{Config, EndPoint};
 
 /// The protocol with certificates on both sides.
 const PROVEN: &str = "tls";
@@ -19,11 +19,11 @@ pub fn check(config: &Config) -> Result<(), String> {
     };
     let allowed = strings(&links.get("transport/link/protocols"));
     if allowed.is_empty() {
-        links.check_endpoints()?;
         links.check_scouting()?;
     } else if let Some(other) = allowed.iter().find(|it| *it != PROVEN) {
         return Err(format!("transport/link/protocols allows {other}"));
     }
+    links.check_endpoints(allowed.is_empty())?;
     let tls = "transport/link/tls";
     if links.get(&format!("{tls}/enable_mtls")) != Value::Bool(true) {
         return Err(format!("{tls}/enable_mtls is not true"));
@@ -33,6 +33,10 @@ pub fn check(config: &Config) -> Result<(), String> {
         _ => Ok(()),
     }
 }
+
+/// The settings of TLS that an endpoint may replace, and must not: with certificates on both sides they are
+/// true, or left to the settings of all endpoints.
+const OF_ENDPOINT: [&str; 2] = ["enable_mtls", "verify_name_on_connect"];
 
 struct Links<'c> {
     /// A setting may be different in each mode.
@@ -48,13 +52,16 @@ impl Links<'_> {
         }
     }
 
-    fn check_endpoints(&self) -> Result<(), String> {
+    /// Checks the endpoints. Those of other protocols have no effect if the allowed protocols are named.
+    fn check_endpoints(&self, any_protocol: bool) -> Result<(), String> {
         for key in ["connect/endpoints", "listen/endpoints"] {
-            let endpoints = strings(&self.get(key));
-            let is_proven = |endpoint: &String| endpoint.split('/').next() == Some(PROVEN);
-            if let Some(other) = endpoints.iter().find(|it| !is_proven(it)) {
-                let other: String = other.chars().take(100).collect();
-                return Err(format!("{key} has {other}"));
+            for endpoint in endpoints(&self.get(key)).map_err(|other| has(key, &other))? {
+                let is_proven = endpoint.protocol().as_str() == PROVEN;
+                let config = endpoint.config();
+                let is_kept = |name: &&str| config.get(name).is_none_or(|value| value == "true");
+                if (any_protocol && !is_proven) || !OF_ENDPOINT.iter().all(is_kept) {
+                    return Err(has(key, &endpoint.to_string()));
+                }
             }
         }
         Ok(())
@@ -79,6 +86,36 @@ fn get(config: &Config, key: &str) -> Value {
 
 fn text(value: &Value) -> Option<String> {
     value.as_str().map(str::to_owned)
+}
+
+/// That the endpoints of a setting have one that admits others.
+fn has(key: &str, endpoint: &str) -> String {
+    let endpoint: String = endpoint.chars().take(100).collect();
+    format!("{key} has {endpoint}")
+}
+
+/// The endpoints in a setting, read as zenoh does: each a text, or several with a strategy.
+///
+/// # Errors
+/// What is none.
+fn endpoints(value: &Value) -> Result<Vec<EndPoint>, String> {
+    match value {
+        Value::Null => Ok(Vec::new()),
+        Value::String(text) => match text.parse() {
+            Ok(endpoint) => Ok(vec![endpoint]),
+            Err(_) => Err(text.clone()),
+        },
+        Value::Array(values) => {
+            let each = values.iter().map(endpoints);
+            let each: Vec<_> = each.collect::<Result<_, _>>()?;
+            Ok(each.into_iter().flatten().collect())
+        }
+        Value::Object(several) => match several.get("locators") {
+            Some(locators) => endpoints(locators),
+            None => Err(value.to_string()),
+        },
+        other => Err(other.to_string()),
+    }
 }
 
 /// All texts in a list, which may have lists in it.
@@ -111,6 +148,8 @@ mod tests {
         assert_eq!(checked(&[]), Ok(()));
         let listens = ("listen/endpoints", "['tls/0.0.0.0:7447']");
         assert_eq!(checked(&[("mode", "'peer'"), listens]), Ok(()));
+        let stated = ("connect/endpoints", "['tls/one:7447#enable_mtls=true']");
+        assert_eq!(checked(&[stated]), Ok(()));
         let only_tls = ("transport/link/protocols", "['tls']");
         let finds = ("scouting/multicast/enabled", "true");
         assert_eq!(checked(&[only_tls, finds]), Ok(()));
@@ -121,6 +160,19 @@ mod tests {
         for (key, value) in [
             ("connect/endpoints", "['tls/one:7447', 'tcp/two:7447']"),
             ("listen/endpoints", "{ client: ['tcp/0.0.0.0:7447'] }"),
+            (
+                "connect/endpoints",
+                "['tls/one:7447', { strategy: 'allOf', locators: ['tls/two:7447', 'tcp/two:7447'] }]",
+            ),
+            ("connect/endpoints", "['tls/one:7447#enable_mtls=false']"),
+            (
+                "connect/endpoints",
+                "['tls/one:7447?prio=1-3#root_ca_certificate_file=/ca.pem;verify_name_on_connect=false']",
+            ),
+            (
+                "listen/endpoints",
+                "{ client: ['tls/0.0.0.0:7447#enable_mtls=0'] }",
+            ),
             ("scouting/multicast/enabled", "true"),
             ("scouting/gossip/enabled", "true"),
             ("transport/link/protocols", "['tls', 'udp']"),
@@ -130,6 +182,15 @@ mod tests {
             let reason = checked(&[(key, value)]).unwrap_err();
             assert!(reason.starts_with(key), "{reason}");
         }
+        // Nor where only TLS is allowed.
+        let mut config = Config::from_json5(TLS).unwrap();
+        for (key, value) in [
+            ("transport/link/protocols", "['tls']"),
+            ("connect/endpoints", "['tls/one:7447#enable_mtls=false']"),
+        ] {
+            config.insert_json5(key, value).unwrap();
+        }
+        assert!(check(&config).unwrap_err().contains("enable_mtls=false"));
         // A peer listens at tcp/[::]:0 unless it is told otherwise.
         let reason = checked(&[("mode", "'peer'")]).unwrap_err();
         assert!(reason.starts_with("listen/endpoints"), "{reason}");

@@ -24,7 +24,7 @@ struct Remote {
 /// The table of bridges.
 ///
 /// A component belongs to the first bridge that has declared its token, until that bridge withdraws it or
-/// is gone. Then it belongs to another one that has declared its token. Messages without a token count
+/// is gone. Then it belongs to the next one that has declared its token. Messages without a token count
 /// for nothing.
 #[derive(Debug, Default)]
 pub(crate) struct Remotes {
@@ -39,26 +39,38 @@ pub(crate) struct Remotes {
 }
 
 /// Tokens of components that belong to another bridge or to this side: those of a bridge that was started
-/// again may come before the old ones are gone.
+/// again may come before the old ones are gone. The earliest counts first: who chooses the id of a bridge gains
+/// nothing by it.
 #[derive(Debug, Default)]
 struct Claims {
-    waiting: BTreeSet<(JausId, BridgeId)>,
+    /// The claims, with their numbers.
+    waiting: BTreeMap<(JausId, BridgeId), u64>,
+    /// The same by component and number.
+    in_order: BTreeMap<(JausId, u64), BridgeId>,
     of_bridge: BTreeMap<BridgeId, usize>,
+    /// The number of the latest claim.
+    latest: u64,
 }
 
 impl Claims {
     fn insert(&mut self, component: JausId, bridge: BridgeId) {
         let of_bridge = self.of_bridge.get(&bridge).copied().unwrap_or(0);
         let has_room = self.waiting.len() < MOST_COMPONENTS && of_bridge < MOST_OF_BRIDGE;
-        if has_room && self.waiting.insert((component, bridge)) {
-            *self.of_bridge.entry(bridge).or_default() += 1;
+        if !has_room || self.waiting.contains_key(&(component, bridge)) {
+            return;
         }
+        self.latest += 1;
+        self.waiting.insert((component, bridge), self.latest);
+        self.in_order.insert((component, self.latest), bridge);
+        *self.of_bridge.entry(bridge).or_default() += 1;
     }
 
     fn remove(&mut self, component: JausId, bridge: BridgeId) {
-        if self.waiting.remove(&(component, bridge))
-            && let Some(count) = self.of_bridge.get_mut(&bridge)
-        {
+        let Some(number) = self.waiting.remove(&(component, bridge)) else {
+            return;
+        };
+        self.in_order.remove(&(component, number));
+        if let Some(count) = self.of_bridge.get_mut(&bridge) {
             *count -= 1;
             if *count == 0 {
                 self.of_bridge.remove(&bridge);
@@ -66,12 +78,12 @@ impl Claims {
         }
     }
 
-    /// A bridge that has declared the token of this component.
+    /// The bridge that was the first to declare the token of this component.
     fn of(&self, component: JausId) -> Option<BridgeId> {
-        let first = (component, BridgeId::new(0));
-        let claim = self.waiting.range(first..).next();
-        claim
-            .filter(|(claimed, _)| *claimed == component)
+        let claims = (component, 0)..=(component, u64::MAX);
+        self.in_order
+            .range(claims)
+            .next()
             .map(|(_, bridge)| *bridge)
     }
 }
@@ -220,6 +232,20 @@ mod tests {
         assert_eq!(withdrawn.next, Some(TWO), "its token was there");
         let next = remotes.hear(TWO, ROVER).unwrap();
         assert_ne!(next, session, "a number is not used twice");
+    }
+
+    #[test]
+    fn of_several_claims_the_first_counts_whatever_the_id_of_its_bridge() {
+        let mut remotes = Remotes::default();
+        let [owner, first, smallest] = [9, 8, 0].map(BridgeId::new);
+        remotes.announce(owner, ROVER).unwrap();
+        for claims in [first, smallest, first] {
+            remotes.announce(claims, ROVER).unwrap_err();
+        }
+        assert_eq!(remotes.withdraw(owner, ROVER).next, Some(first));
+        assert_eq!(remotes.withdraw(first, ROVER).next, Some(smallest));
+        assert_eq!(remotes.withdraw(smallest, ROVER).next, None);
+        assert!(remotes.claims.in_order.is_empty() && remotes.claims.waiting.is_empty());
     }
 
     #[test]

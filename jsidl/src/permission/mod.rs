@@ -30,6 +30,11 @@
 //! Where several services give one code to different messages, the rights to all of them are needed: a node
 //! cannot tell which of them is meant.
 //!
+//! A message that only stops or ends something, whatever its fields say, has `stops="true"` as well. It then
+//! passes also where commands are refused because they cannot be recorded, and one for a group reaches those of
+//! the group that its sender may reach. What its sender needs stays the same. `release` and `emergency` stop
+//! without it.
+//!
 //! If the receiver of a message sends those that it carries on to other components, as a mission spooler does,
 //! the attribute `destination` names the field with the id of the component: 4 octets, before the message in
 //! the same element.
@@ -95,6 +100,11 @@ impl Permission {
 }
 
 impl Permission {
+    /// Whether a message that needs it stops or ends something and does nothing else.
+    const fn stops(&self) -> bool {
+        matches!(self, Self::Release | Self::Emergency)
+    }
+
     /// The field that a node reads, to decide on the message or to record it.
     pub(crate) fn field(&self) -> Option<&str> {
         match self {
@@ -130,6 +140,8 @@ struct Row {
     /// The rights, with the places of their fields, in octets from the beginning of the message.
     needs: BTreeSet<(Permission, Option<usize>)>,
     names: BTreeSet<String>,
+    /// Whether a message with this code does something else than to stop.
+    acts: bool,
     /// The layouts of messages with this code that carry others.
     carries: BTreeSet<String>,
 }
@@ -179,6 +191,7 @@ impl Permissions {
             return;
         }
         let row = self.rows.entry(message.code).or_default();
+        row.acts |= !message.stops && !needs.iter().all(Permission::stops);
         row.needs.extend(needs.into_iter().map(|needs| {
             let place = needs.field().and_then(|field| place_of(message, field));
             (needs, place)
@@ -194,13 +207,14 @@ impl Permissions {
 /// ```text
 /// 000D control@2 RequestControl
 /// 01F0 observe CreateEvent [4m4]
+/// D112 command StopMission stops
 /// F92A command,observe CBRNScanWindowConfigurationCommand,QueryMeasurement
 /// service urn:jaus:jss:core:Time 0011 2011
 /// ```
 ///
 /// The code in hexadecimal digits; the rights, separated by commas, each with the place of the field that
-/// belongs to it; the names, separated by commas; and for a message that carries others, the layouts that it may have. A service
-/// has the codes that it receives.
+/// belongs to it; the names, separated by commas; `stops` if all messages with the code only stop or end something; and
+/// for a message that carries others, the layouts that it may have. A service has the codes that it receives.
 impl fmt::Display for Permissions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (code, row) in &self.rows {
@@ -212,6 +226,9 @@ impl fmt::Display for Permissions {
             let mut line = format!("{code:04X} {}", needs.join(","));
             let names: Vec<_> = row.names.iter().map(String::as_str).collect();
             write!(line, " {}", names.join(","))?;
+            if !row.acts {
+                line.push_str(" stops");
+            }
             for layout in &row.carries {
                 write!(line, " [{layout}]")?;
             }

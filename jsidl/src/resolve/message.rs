@@ -30,6 +30,7 @@ impl Resolver<'_> {
             is_command: message.is_command,
             is_deprecated: message.is_deprecated,
             permission: message.permission.clone(),
+            stops: message.stops,
             destination: message.destination.as_ref().map(|it| it.value.clone()),
             description: message.description.clone(),
             header,

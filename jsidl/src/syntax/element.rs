@@ -300,10 +300,18 @@ impl Reader<'_> {
     }
 
     /// A Boolean attribute. `Ok(None)` if it is absent.
-    pub(super) fn flag(&mut self, xml: Xml<'_, '_>, name: &str) -> Result<Option<bool>, Faulty> {
+    pub(super) fn flag<'n, 'm>(
+        &mut self,
+        xml: Xml<'_, '_>,
+        name: impl Into<ExpandedName<'n, 'm>>,
+    ) -> Result<Option<bool>, Faulty> {
+        let name = name.into();
         match self.attribute(xml, name) {
             None => Ok(None),
-            Some(text) => self.word(&text, name, &FLAGS).map(Some).ok_or(Faulty),
+            Some(text) => self
+                .word(&text, name.name(), &FLAGS)
+                .map(Some)
+                .ok_or(Faulty),
         }
     }
 

@@ -60,6 +60,7 @@ impl Reader<'_> {
         let is_command = self.flag(xml, "is_command");
         let is_deprecated = self.flag(xml, "deprecated");
         let permission = self.permission(xml);
+        let stops = self.flag(xml, (EXTENSION, "stops"));
         let description = children.find("description");
         let [header, body, footer] = self.sections(&children);
         Some(MessageDef {
@@ -67,6 +68,7 @@ impl Reader<'_> {
             is_command: is_command.ok()?.unwrap_or(false),
             is_deprecated: is_deprecated.ok()?.unwrap_or(false),
             permission: permission.ok()?,
+            stops: stops.ok()?.unwrap_or(false),
             destination: self.attribute(xml, (EXTENSION, "destination")),
             description: description
                 .map(|it| self.description(it))

@@ -236,6 +236,7 @@ pub(crate) struct MessageDef {
     pub(crate) is_command: bool,
     pub(crate) is_deprecated: bool,
     pub(crate) permission: Option<Permission>,
+    pub(crate) stops: bool,
     pub(crate) destination: Option<Spanned<String>>,
     pub(crate) description: String,
     pub(crate) header: Section,

@@ -210,6 +210,55 @@ fn every_message_of_the_catalogue_states_what_it_needs() {
     );
 }
 
+#[test]
+fn those_of_the_catalogue_that_stop_or_end_and_do_nothing_else_say_so() {
+    let table = Permissions::of(&catalogue()).to_string();
+    let stops = table.lines().filter_map(|it| it.strip_suffix(" stops"));
+    let stops: Vec<_> = stops.collect();
+    // Not Shutdown and Reset: what they end may be what watches over others, and what they leave does not stop
+    // at once. Nor what removes zones, tasks or elements: what is left may move farther.
+    assert_eq!(
+        stops,
+        [
+            "0003 command Standby",
+            "0006 emergency SetEmergency",
+            "000E release ReleaseControl",
+            "0E02 command AbortMission",
+            "0E03 command PauseMission",
+            "D112 command StopMission",
+            "FF34 release RemoveHandoffRequest",
+        ]
+    );
+}
+
+#[test]
+fn a_code_stops_only_if_all_of_its_messages_do() {
+    let stop = |name, code| {
+        message(
+            name,
+            code,
+            r#"own:permission="command" own:stops="true""#,
+            "",
+        )
+    };
+    let move_on = message("MoveOn", "D001", r#"own:permission="command""#, "");
+    let inputs = [stop("Halt", "D000"), stop("Rest", "D001"), move_on];
+    let (table, _) = permissions(&inputs, &[]).unwrap();
+    let lines: Vec<_> = table.lines().take(2).collect();
+    assert_eq!(
+        lines,
+        ["D000 command Halt stops", "D001 command MoveOn,Rest"]
+    );
+    let wrong = message(
+        "Halt",
+        "D000",
+        r#"own:permission="command" own:stops="yes""#,
+        "",
+    );
+    let error = permissions(&[wrong], &[]).unwrap_err();
+    assert!(error.contains("`yes` is not a value of `stops`"), "{error}");
+}
+
 /// Messages that change or move something, or record and store it, by what the standards say of them.
 const COMMANDS: &str = "
 AbortMission AddNoGoZone ApproveMission CBRNCommand CBRNConfigurationCommand CBRNDisplayConfigurationCommand

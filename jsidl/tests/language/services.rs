@@ -530,7 +530,7 @@ fn a_strict_check_of_our_definitions_finds_nothing_but_our_own_attributes() {
             .file
             .components()
             .any(|it| it.as_os_str() == "ra33");
-        let known = ["permission", "authority", "granted", "destination"].iter();
+        let known = ["permission", "authority", "granted", "stops", "destination"].iter();
         let mut known = known.chain(of_ra.then_some(&"bias")).map(|own| {
             format!("the standard has no attribute `{own}` of the namespace `urn:jaus-rs:jsidl`")
         });

@@ -328,9 +328,16 @@ fn what_cannot_be_recorded_is_refused_but_stops_are_not() {
     rig.endpoint.refuse_commands(true);
     rig.hear(&request_control());
     assert!(rig.received().is_empty());
-    rig.hear(&from_peer(b"\x06\x00\x01\x00"));
-    assert_eq!(rig.received().len(), 1);
-    assert_eq!(rig.count(Counter::NotGranted), 1);
+    rig.hear(&from_peer(b"\x04\x00"));
+    assert!(rig.received().is_empty(), "Resume");
+    for (number, stop) in [&b"\x06\x00\x01\x00"[..], b"\x03\x00", b"\x12\xD1"]
+        .into_iter()
+        .enumerate()
+    {
+        rig.hear(&from_peer(stop));
+        assert_eq!(rig.received().len(), 1, "{number}");
+    }
+    assert_eq!(rig.count(Counter::NotGranted), 2);
 }
 
 #[test]

@@ -178,3 +178,30 @@ fn an_answer_with_the_code_of_a_command_needs_no_right() {
         );
     }
 }
+
+#[test]
+fn a_message_stops_only_if_all_that_its_code_may_mean_and_all_that_it_carries_stops() {
+    let table = Table::default();
+    let standby = b"\x03\0";
+    for message in [&standby[..], b"\x06\0\x01\0", b"\x0E\0", b"\x12\xD1"] {
+        assert!(table.stops(message), "{message:x?}");
+    }
+    // Resume, Shutdown, an event that carries Standby, an unknown code, and no code.
+    let event = [&b"\xF6\x01\x01\x0A\0\0\0\x02\0\0\0"[..], standby].concat();
+    for message in [&b"\x04\0"[..], b"\x02\0", &event, b"\xBC\xDA", b"\x03"] {
+        assert!(!table.stops(message), "{message:x?}");
+    }
+    let other = table.with("0003 command StartEngine").unwrap();
+    assert!(!other.stops(standby), "the code may mean another message");
+    // Who carries nothing but stops, stops.
+    let lines = "D105 carry PassOn stops [m2]\n0003 command Idle stops";
+    let own = table.with(lines).unwrap();
+    assert!(own.stops(standby));
+    let pass_on = |message: &[u8]| {
+        let length = (message.len() as u16).to_le_bytes();
+        own.stops(&[&b"\x05\xD1"[..], &length, message].concat())
+    };
+    assert!(pass_on(standby));
+    assert!(!pass_on(b"\x04\0"));
+    assert!(!own.stops(b"\x05\xD1\xFF\xFF\x03\0"), "malformed");
+}

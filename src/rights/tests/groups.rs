@@ -58,10 +58,12 @@ fn a_command_to_several_ids_needs_all_of_them_and_a_query_one() {
 
 const STOP: &[u8] = b"\x06\0\x01\0";
 const RELEASE: &[u8] = b"\x0E\0";
+const STANDBY: &[u8] = b"\x03\0";
 
 #[test]
 fn what_ends_or_stops_reaches_those_of_a_group_that_its_sender_may_reach_and_no_others() {
-    let rules: Rules = "with=101.1.255,102.255.255,102.1.1".parse().unwrap();
+    let rules = "command with=101.1.255,102.255.255,102.1.1";
+    let rules: Rules = rules.parse().unwrap();
     let admitted = |to: &str, message: &'static [u8]| {
         let frame = Frame {
             destination: to.parse().unwrap(),
@@ -76,7 +78,7 @@ fn what_ends_or_stops_reaches_those_of_a_group_that_its_sender_may_reach_and_no_
         Ok::<_, Refusal>(ids)
     };
     let narrowed = |ids: &str| Ok(Some(ids.to_owned()));
-    for message in [STOP, RELEASE] {
+    for message in [STOP, RELEASE, STANDBY] {
         for inside in ["101.1.1", "101.1.255", "102.7.255"] {
             assert_eq!(admitted(inside, message), Ok(None), "{inside}");
         }
@@ -90,6 +92,17 @@ fn what_ends_or_stops_reaches_those_of_a_group_that_its_sender_may_reach_and_no_
     }
     // A query may go to all: it does nothing.
     assert_eq!(admitted("65535.255.255", b"\x00\x2B\x02"), Ok(None));
+    // A stop that is a command needs the right to it, and cannot be narrowed inside of another message.
+    let all = JausId::EVERYONE;
+    assert_eq!(
+        check_to("with=101.1.255", all, STANDBY),
+        Err(Refusal::Command)
+    );
+    let event = [&b"\xF6\x01\x01\x0A\0\0\0\x02\0\0\0"[..], STANDBY].concat();
+    assert_eq!(
+        check_to("command with=101.1.255", all, &event),
+        Err(Refusal::TooWide)
+    );
     // Who cannot narrow it must not let it pass.
     assert_eq!(
         check_to("with=101.1.255", JausId::EVERYONE, STOP),

@@ -12,7 +12,7 @@ use jaus::component::Kind;
 use jaus::link::{Group, STANDARD_PORT};
 use jaus::node::{Config, units};
 use jaus::rights::{Acceptance, Grant};
-use jaus_audit::AuditLog;
+use jaus_cli::audit::{AuditLog, recorder};
 use jaus_cli::output::Output;
 use jaus_cli::runtime::{control_timeout, duration};
 use jaus_cli::{Failure, Ready, launch};
@@ -91,7 +91,7 @@ struct RaNetwork {
 
     /// What RA components may send to JAUS components, by the JAUS ids that they have here: "20
     /// control=127" or "65535.255.255 observe"; the first that matches counts, and others are refused
-    /// (repeatable) [default: all may query and subscribe]
+    /// (repeatable) [default: all may observe: query, subscribe and set emergencies]
     ///
     /// RA systems prove no ids. `jaus keys trust --help` has the words.
     #[arg(long, value_name = "IDS RULES")]
@@ -207,6 +207,12 @@ impl Ready for Flags {
             false => print_text,
         };
         let settings = self.settings();
+        match self.ra.ra_grant.is_empty() {
+            true => tracing::info!(
+                "RA clients may look and stop (set emergencies), and not command; --ra-grant gives rights"
+            ),
+            false => tracing::info!("RA clients may do what --ra-grant gives them"),
+        }
         // Report invalid ids before anything is opened.
         Gateway::check(&settings).map_err(Failure::of)?;
         Ok(RaGateway {
@@ -217,7 +223,7 @@ impl Ready for Flags {
             port: self.ra.ra_port,
             reports: self.stats,
             reporter,
-            audit: self.audit,
+            recorder: self.audit.map(|log| recorder(log, "RA")),
         })
     }
 }

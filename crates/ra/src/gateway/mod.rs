@@ -81,6 +81,8 @@ pub struct Gateway {
     shown: BTreeMap<u16, u8>,
     actions: VecDeque<Action>,
     decisions: DecisionQueue<RaId>,
+    /// Whether what cannot be recorded is refused.
+    is_refusing: bool,
     tally: Tally,
 }
 
@@ -148,6 +150,7 @@ impl Gateway {
             shown: BTreeMap::new(),
             actions: VecDeque::new(),
             decisions: DecisionQueue::default(),
+            is_refusing: false,
             tally: Tally::default(),
         })
     }

@@ -91,7 +91,8 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for it in &self.ra_components {
             let controlled = if it.controlled { ", controlled" } else { "" };
-            writeln!(f, "RA {} as {}: {}{controlled}", it.ra, it.jaus, it.name)?;
+            let name = jaus_text::quoted(&it.name);
+            writeln!(f, "RA {} as {}: {name}{controlled}", it.ra, it.jaus)?;
         }
         for it in &self.jaus_components {
             writeln!(f, "{} as RA {}", it.jaus, it.ra)?;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
-use jaus::rights::{Decided, Decision, Table, Unaccepted, denial};
+use jaus::rights::{Decided, Decision, Table, Unaccepted, check_unrecorded, denial};
 use jaus::wire::Frame;
 
 use super::proxy::Proxy;
@@ -24,7 +24,7 @@ impl Gateway {
         let (mut denials, table) = (Vec::new(), Table::default());
         while let Some(message) = proxy.poll_transmit() {
             let frame = frame_of(&message);
-            let checked = self.settings.grants.check(&frame, &table);
+            let checked = self.check_sent(&frame, &table);
             if let Some(decision) = Decision::of(&frame, checked, &table) {
                 self.record(now, decision, proxy.ra());
             }
@@ -38,6 +38,19 @@ impl Gateway {
             }
         }
         denials
+    }
+
+    /// Whether to refuse what changes something, because it could not be recorded.
+    pub const fn refuse_commands(&mut self, is_refusing: bool) {
+        self.is_refusing = is_refusing;
+    }
+
+    fn check_sent(&self, frame: &Frame, table: &Table) -> Result<(), Unaccepted> {
+        self.settings.grants.check(frame, table)?;
+        match self.is_refusing {
+            true => check_unrecorded(frame, table).map_err(Unaccepted::Rule),
+            false => Ok(()),
+        }
     }
 
     /// Records what a JAUS component tells an RA component about its control.

@@ -12,14 +12,14 @@ use bytes::Bytes;
 use tokio::time::{Interval, MissedTickBehavior};
 
 use super::{Action, Gateway, Report, Settings};
+use crate::RaId;
 use crate::carrier::To;
 use jaus::address::JausId;
 use jaus::endpoint::Received;
 use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
-use jaus::node::{Node, Port, Resident, now, sleep_until};
+use jaus::node::{Node, Port, Recorder, Resident, now, sleep_until};
 use jaus::wire::Priority;
-use jaus_audit::{AuditLog, Entry};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// Configuration of a running gateway between RA systems and JAUS.
@@ -37,7 +37,7 @@ use jaus_vehicle::parts::{Part, PartError, Slot};
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct RaGateway {
     /// Gateway settings.
     pub settings: Settings,
@@ -53,8 +53,8 @@ pub struct RaGateway {
     pub reports: Option<Duration>,
     /// Receiver of the reports.
     pub reporter: fn(&Report),
-    /// The log of what RA components may and may not do.
-    pub audit: Option<AuditLog>,
+    /// Takes what RA components may and may not do, for an audit log.
+    pub recorder: Option<Recorder<RaId>>,
 }
 
 impl RaGateway {
@@ -76,7 +76,7 @@ impl Default for RaGateway {
             port: STANDARD_PORT,
             reports: None,
             reporter: |report| tracing::info!("{}", report.line()),
-            audit: None,
+            recorder: None,
         }
     }
 }
@@ -107,7 +107,7 @@ impl Part for RaGateway {
             node,
             reports: self.reports,
             reporter: self.reporter,
-            audit: self.audit,
+            recorder: self.recorder,
         }));
         let Some(running) = &mut running.0 else {
             return Err(PartError::NodeStopped);
@@ -176,7 +176,7 @@ struct Running {
     node: Node,
     reports: Option<Duration>,
     reporter: fn(&Report),
-    audit: Option<AuditLog>,
+    recorder: Option<Recorder<RaId>>,
 }
 
 /// A received datagram or message.
@@ -244,6 +244,9 @@ impl Running {
     fn poll_arrival(&mut self, cx: &mut std::task::Context<'_>) -> Poll<Arrival> {
         // The next poll sends what is left.
         let _ = self.link.poll_flush(cx);
+        if let Some(recorder) = &self.recorder {
+            self.gateway.refuse_commands(recorder.refuses_commands());
+        }
         if let Poll::Ready((from, datagram)) = self.link.poll_recv(cx, &mut self.slab) {
             return Poll::Ready(Arrival::Datagram(from, datagram));
         }
@@ -258,11 +261,10 @@ impl Running {
     }
 
     fn carry_out(&mut self) {
-        while let Some(decided) = self.gateway.poll_decision() {
-            if let Some(log) = &self.audit {
-                let who = format_args!("RA {}", decided.client);
-                log.write(Entry::of(who, &decided.decision).times(decided.times));
-            }
+        let decisions = std::iter::from_fn(|| self.gateway.poll_decision());
+        match &mut self.recorder {
+            Some(recorder) => recorder.record_all(decisions),
+            None => decisions.for_each(drop),
         }
         while let Some(transmit) = self.gateway.poll_transmit() {
             let (link, datagram) = (&mut self.link, &transmit.datagram);

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use jaus::rights::Acceptance;
+use jaus::address::JausId;
+use jaus::rights::{Acceptance, Grant, Rules};
 
 use crate::{ids, node};
 
@@ -27,7 +28,8 @@ pub struct Settings {
     pub max_components: usize,
     /// How long changes of a JAUS subsystem are collected before RA systems are notified.
     pub gather: Duration,
-    /// What RA components may send to JAUS components, by their JAUS ids. Others than these are not heard.
+    /// What RA components may send to JAUS components, by their JAUS ids. Others than these are not heard. By
+    /// default all may observe, which includes to set an emergency.
     pub grants: Acceptance,
     /// Settings of the RA node.
     pub ra: node::Settings,
@@ -65,7 +67,11 @@ impl Default for Settings {
             timeout: Duration::from_secs(4),
             max_components: 253,
             gather: Duration::from_millis(300),
-            grants: Acceptance::default(),
+            // Whoever may look may stop.
+            grants: Acceptance::new([Grant {
+                ids: JausId::EVERYONE,
+                rules: Rules::default(),
+            }]),
             ra: node::Settings::default(),
         }
     }

@@ -79,7 +79,7 @@ impl RaNode {
             whole.data = data.into();
         }
         let report: ReportIdentification = whole.body().ok()?;
-        let name = readable(&report.identification);
+        let name = name_of(&report.identification);
         let source = message.source;
         let Some(peer) = self.peers.get_mut(&source.subsystem) else {
             return Some(());
@@ -318,11 +318,10 @@ fn confirmation(message: &Message) -> Option<ConfirmEventRequest> {
     known.body().ok()
 }
 
-/// A name up to its first zero, in printable characters.
-fn readable(name: &Text) -> String {
+/// A name up to its first zero, as received: who shows it escapes it.
+fn name_of(name: &Text) -> String {
     let octets = name.as_bytes().split(|&octet| octet == 0).next();
-    let text = String::from_utf8_lossy(octets.unwrap_or_default());
-    jaus_text::visible(&text).into_owned()
+    String::from_utf8_lossy(octets.unwrap_or_default()).into_owned()
 }
 
 fn service(seq: &report_services::ServiceSeq) -> RaServiceEntry {

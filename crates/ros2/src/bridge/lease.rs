@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use jaus::address::JausId;
 use jaus::component::{
-    Component, Retake, Session, SessionError, SessionSettings, SessionState, TargetState,
+    Component, ControlRefused, Retake, Session, SessionError, SessionLoss, SessionSettings,
+    SessionState, TargetState,
 };
 
 use super::drive::Access;
+use super::rights::Said;
 use super::vehicle::Role;
 
 /// The control of a component that the bridge wants or has.
@@ -19,6 +21,8 @@ pub(super) struct Lease {
     logged: Option<SessionState>,
     /// Why control was last refused or lost; empty while there is no reason.
     obstacle: String,
+    /// What the component has said about control since the last look.
+    said: Option<(JausId, Said)>,
 }
 
 #[derive(Debug, Default)]
@@ -33,6 +37,8 @@ enum Phase {
         /// Whether it was ready. From then on, the component is not made ready again: its standby
         /// has a reason.
         was_ready: bool,
+        /// What it said last about control.
+        said: Option<Said>,
     },
 }
 
@@ -68,6 +74,7 @@ impl Lease {
                     target,
                     session: Arc::new(session),
                     was_ready: false,
+                    said: None,
                 };
             }
             Err(error) => {
@@ -80,7 +87,10 @@ impl Lease {
     /// The access to the component; `None` if it is not wanted.
     pub(super) fn access(&mut self) -> Option<Access> {
         let Phase::Begun {
-            session, was_ready, ..
+            session,
+            was_ready,
+            said,
+            target: (peer, _),
         } = &mut self.phase
         else {
             return self.target().map(|_| Access::Pending);
@@ -103,10 +113,27 @@ impl Lease {
             // Fails only if the component has stopped, which releases control.
             let _ = session.set_target(TargetState::AsFound);
         }
+        let says = match (state, *said) {
+            (state, None | Some(Said::Refused | Said::Ended)) if state.held().is_some() => {
+                Some(Said::Granted)
+            }
+            (SessionState::Lost { why, .. }, None) if is_answer(why) => Some(Said::Refused),
+            (SessionState::Lost { .. }, Some(Said::Granted)) => Some(Said::Ended),
+            _ => None,
+        };
+        if says.is_some() {
+            *said = says;
+            self.said = says.map(|says| (*peer, says));
+        }
         if access == Access::Lost {
             self.obstacle = state.to_string();
         }
         Some(access)
+    }
+
+    /// What the component has said about control since the last call.
+    pub(super) fn take_said(&mut self) -> Option<(JausId, Said)> {
+        self.said.take()
     }
 
     /// The session if the component obeys, and the service by which it is commanded.
@@ -140,6 +167,11 @@ impl Lease {
             Phase::Begun { session, .. } => session.state().to_string(),
         }
     }
+}
+
+/// Whether a component has refused control, or does not answer.
+const fn is_answer(why: SessionLoss) -> bool {
+    matches!(why, SessionLoss::Refused(why) if !matches!(why, ControlRefused::NoAnswer(_)))
 }
 
 /// Begins a session that takes control once, and makes the component ready if it may.

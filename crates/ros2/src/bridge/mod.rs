@@ -35,6 +35,7 @@ pub mod vehicle;
 pub mod velocity;
 
 use jaus::component::Component;
+use jaus::node::Recorder;
 use jaus::rights::Rules;
 use jaus::service::TimeOfDay;
 use jaus_vehicle::parts::PartError;
@@ -51,6 +52,8 @@ pub use topics::TopicSettings;
 
 use drive::DriveSettings;
 use vehicle::Selection;
+
+use crate::graph::Gid;
 
 /// The settings of the JAUS side.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,16 +89,17 @@ impl Settings {
 }
 
 /// Runs the JAUS side until the component or the ROS side stops. Outputs that the ROS side does not
-/// take in time are dropped and counted. `time` stamps what has no time stamp of its own.
+/// take in time are dropped and counted. `time` stamps what has no time stamp of its own. The recorder takes what
+/// the publishers of ROS may and may not do, for an audit log.
 pub async fn run(
     component: Component,
     time: TimeOfDay,
     settings: Settings,
     reports: Reports,
-    inputs: mpsc::Receiver<Input>,
-    outputs: mpsc::Sender<Output>,
+    recorder: Option<Recorder<Gid>>,
+    ports: (mpsc::Receiver<Input>, mpsc::Sender<Output>),
 ) -> PartError {
-    runner::Runner::new(component, time, settings, reports, inputs, outputs)
+    runner::Runner::new(component, time, settings, reports, recorder, ports)
         .run()
         .await
 }

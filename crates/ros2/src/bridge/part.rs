@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use jaus::node::Recorder;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 use jaus_zenoh::NetworkSettings;
 use tokio::sync::mpsc;
@@ -12,6 +13,7 @@ use super::report_topics::ReportTopics;
 use super::reports::Reports;
 use super::topics::{TopicSettings, Topics};
 use super::{Settings, run};
+use crate::graph::Gid;
 use crate::session::{self, Ros, SessionError};
 
 /// A bridge between a JAUS vehicle and ROS 2.
@@ -36,6 +38,7 @@ pub struct Bridge {
     settings: Settings,
     topics: Topics,
     reports: Reports,
+    recorder: Option<Recorder<Gid>>,
 }
 
 /// Why a bridge cannot be created.
@@ -77,7 +80,15 @@ impl Bridge {
             settings,
             topics,
             reports,
+            recorder: None,
         })
+    }
+
+    /// Records what the publishers of ROS may and may not do, for an audit log.
+    #[must_use]
+    pub fn recorded_by(mut self, recorder: Option<Recorder<Gid>>) -> Self {
+        self.recorder = recorder;
+        self
     }
 }
 
@@ -110,8 +121,8 @@ impl Part for Bridge {
             time,
             self.settings,
             self.reports,
-            received,
-            outputs,
+            self.recorder,
+            (received, outputs),
         );
         tokio::select! {
             error = running => Err(error),

@@ -12,17 +12,17 @@ use super::samples::{FixSample, OdometrySample, PoseSample, TwistSample};
 use super::velocity::Twist;
 use crate::graph::Gid;
 
-/// What arrives from ROS.
+/// What arrives from ROS, with its publisher.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
     /// A `cmd_vel`.
     Twist(Command),
     /// A `goal_pose`.
-    Goal(GoalPose),
+    Goal(Gid, GoalPose),
     /// An `emergency_stop`: whether to set it or to clear it.
-    EmergencyStop(bool),
+    EmergencyStop(Gid, bool),
     /// A `release`: give up control and cancel the goal.
-    Release,
+    Release(Gid),
     /// A message whose publisher has no liveliness token on its topic: its gid is made up.
     Unannounced(Gid),
     /// A publisher of `cmd_vel` is gone.

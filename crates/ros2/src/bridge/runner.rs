@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::node::now;
-use jaus::rights::Refusal as Forbidden;
+use jaus::node::{Recorder, now};
 use jaus::service::{Directory, State, TimeOfDay};
 use jaus_vehicle::parts::PartError;
 use tokio::sync::mpsc;
@@ -25,10 +24,12 @@ use super::jobs::{Finished, Jobs};
 use super::lease::Lease;
 use super::ports::{Command, GoalPose, Input, Output};
 use super::report::Report;
-use super::rights::Rights;
+use super::rights::{Forbidden, Rights, Said};
 use super::samples::{FixSample, Odometry, PoseSample, TwistSample};
 use super::vehicle::{Role, Vehicle};
+use super::velocity::Twist;
 use super::{Reports, Settings};
+use crate::graph::Gid;
 
 /// The vehicle's side of the bridge.
 pub(super) struct Runner {
@@ -44,8 +45,12 @@ pub(super) struct Runner {
     jobs: Jobs,
     drive: Drive,
     drive_lease: Lease,
+    /// The publisher for which control of the driver was last wanted.
+    driver: Option<Gid>,
     navigation: Navigation,
     goal_lease: Lease,
+    /// The publisher of the last goal.
+    navigator: Option<Gid>,
     emergency: Emergency,
     odometry: Odometry,
     received: mpsc::Receiver<Received>,
@@ -71,21 +76,23 @@ impl Runner {
         time: TimeOfDay,
         settings: Settings,
         reports: Reports,
-        inputs: mpsc::Receiver<Input>,
-        outputs: mpsc::Sender<Output>,
+        recorder: Option<Recorder<Gid>>,
+        (inputs, outputs): (mpsc::Receiver<Input>, mpsc::Sender<Output>),
     ) -> Self {
         let (sender, received) = mpsc::channel(Self::QUEUE);
         let subsystem = settings.vehicle.subsystem;
         Self {
-            rights: Rights::new(settings.rules.clone(), component.id(), subsystem),
+            rights: Rights::new(settings.rules.clone(), component.id(), subsystem, recorder),
             vehicle: Vehicle::new(component.id(), settings.vehicle.clone()),
             known: None,
             following: Following::new(component.clone(), sender, settings.rate_hz),
             jobs: Jobs::new(component.clone()),
             drive: Drive::new(settings.drive),
             drive_lease: Lease::default(),
+            driver: None,
             navigation: Navigation::default(),
             goal_lease: Lease::default(),
+            navigator: None,
             emergency: Emergency::default(),
             odometry: Odometry::default(),
             counters: Counters::default(),
@@ -135,9 +142,10 @@ impl Runner {
     fn handle_input(&mut self, now: Instant, input: Input) {
         match input {
             Input::Twist(command) => self.handle_twist(now, &command),
-            Input::Goal(pose) => self.handle_goal(now, &pose),
-            Input::EmergencyStop(on) => self.handle_emergency(now, on),
-            Input::Release => {
+            Input::Goal(by, pose) => self.handle_goal(now, by, &pose),
+            Input::EmergencyStop(by, on) => self.handle_emergency(now, by, on),
+            Input::Release(by) => {
+                self.rights.record_release(by);
                 self.drive.halt(now);
                 self.navigation.cancel(now);
             }
@@ -173,13 +181,15 @@ impl Runner {
 
     fn handle_twist(&mut self, now: Instant, command: &Command) {
         self.counters.add(Counter::Velocities);
-        if let Err(refusal) = self.rights.check_drive(self.vehicle.drive()) {
-            return self.refuse(Counter::Forbidden, &remedy(refusal));
+        let moves = command.twist != Twist::default();
+        if let Err(forbidden) = self.rights.check_drive(self.vehicle.drive(), moves) {
+            return self.forbid(Counter::Forbidden, command.publisher, &forbidden);
         }
         self.warn_without_driver();
         let refusal = match self.drive.handle_command(now, command) {
             Ok(()) => {
                 if self.drive.is_moving() {
+                    self.driver = Some(command.publisher);
                     // A velocity replaces a goal.
                     self.navigation.cancel(now);
                 }
@@ -196,16 +206,17 @@ impl Runner {
         self.refuse(counter, &refusal.to_string());
     }
 
-    fn handle_goal(&mut self, now: Instant, pose: &GoalPose) {
+    fn handle_goal(&mut self, now: Instant, by: Gid, pose: &GoalPose) {
         self.counters.add(Counter::Goals);
-        if let Err(refusal) = self.rights.check_goal(self.vehicle.goal()) {
-            return self.refuse(Counter::Forbidden, &remedy(refusal));
+        if let Err(forbidden) = self.rights.check_goal(self.vehicle.goal()) {
+            return self.forbid(Counter::Forbidden, by, &forbidden);
         }
         match self.goal(pose) {
             Ok(goal) => {
                 tracing::info!("goal: {:.1} m north, {:.1} m east", goal.x, goal.y);
                 self.drive.halt(now);
                 self.navigation.set(now, goal);
+                self.navigator = Some(by);
             }
             Err(why) => self.refuse(Counter::GoalRefused, &why),
         }
@@ -223,15 +234,16 @@ impl Runner {
         Ok(goal)
     }
 
-    fn handle_emergency(&mut self, now: Instant, on: bool) {
+    fn handle_emergency(&mut self, now: Instant, by: Gid, on: bool) {
         let parts = self.vehicle.all(Role::Management);
-        if let Err(refusal) = self.rights.check_emergency(on, parts) {
+        if let Err(forbidden) = self.rights.check_emergency(on, parts) {
             let counter = match on {
                 true => Counter::EmergencyRefused,
                 false => Counter::ClearRefused,
             };
-            return self.refuse(counter, &remedy(refusal));
+            return self.forbid(counter, by, &forbidden);
         }
+        self.rights.record_emergency(by, on);
         if on {
             self.counters.add(Counter::Emergencies);
             if !self.emergency.is_being_set() {
@@ -244,6 +256,12 @@ impl Runner {
         }
         self.jobs.end_alarms();
         self.emergency.request(now, on);
+    }
+
+    /// Records that a publisher was refused, and counts it.
+    fn forbid(&mut self, counter: Counter, by: Gid, forbidden: &Forbidden) {
+        self.rights.record_refusal(by, forbidden);
+        self.refuse(counter, &forbidden.to_string());
     }
 
     /// Counts a refusal, and logs the first of its kind.
@@ -380,11 +398,29 @@ impl Runner {
         }
         let driver = self.vehicle.drive();
         let wanted = driver.filter(|_| self.drive.wants_control());
-        if let Some(peer) = self.drive_lease.want(wanted)
+        let (said, requested) = (self.drive_lease.take_said(), self.drive_lease.want(wanted));
+        self.record_control(self.driver, said, requested);
+        if let Some(peer) = requested
             && let Some(authority) = self.rights.authority()
         {
             let is_ready = self.rights.may_resume(peer);
             self.jobs.begin(true, peer, authority, is_ready);
+        }
+    }
+
+    /// Records what a component said about the control of a publisher, and that control is requested for it.
+    fn record_control(
+        &mut self,
+        by: Option<Gid>,
+        said: Option<(JausId, Said)>,
+        requested: Option<JausId>,
+    ) {
+        let Some(by) = by else { return };
+        if let Some((component, said)) = said {
+            self.rights.record_answer(by, component, said);
+        }
+        if let Some(component) = requested {
+            self.rights.record_request(by, component);
         }
     }
 
@@ -408,7 +444,9 @@ impl Runner {
         }
         let target = self.vehicle.goal();
         let wanted = target.filter(|_| self.navigation.wants_control());
-        if let Some(peer) = self.goal_lease.want(wanted)
+        let (said, requested) = (self.goal_lease.take_said(), self.goal_lease.want(wanted));
+        self.record_control(self.navigator, said, requested);
+        if let Some(peer) = requested
             && let Some(authority) = self.rights.authority()
         {
             let is_ready = self.rights.may_resume(peer);
@@ -459,11 +497,6 @@ impl Runner {
         };
         self.counters.add(counter);
     }
-}
-
-/// Why a rule forbids something, with the flag that allows it.
-fn remedy(refusal: Forbidden) -> String {
-    jaus_zenoh::remedy(refusal, "--rights")
 }
 
 impl Drop for Runner {

@@ -136,16 +136,17 @@ impl Topics {
             }))
         }));
         let goal = self.incoming("goal_pose", &self.types.pose, inputs)?;
-        tasks.spawn(
-            goal.forward(|received, _| Some(Input::Goal(read_goal(&received.message).ok()?))),
-        );
+        tasks.spawn(goal.forward(|received, _| {
+            let pose = read_goal(&received.message).ok()?;
+            Some(Input::Goal(received.attachment.gid, pose))
+        }));
         let stop = self.incoming("emergency_stop", &self.types.bool, inputs)?;
         tasks.spawn(stop.forward(|received, _| {
             let on = received.message.get("data").ok()?.as_bool()?;
-            Some(Input::EmergencyStop(on))
+            Some(Input::EmergencyStop(received.attachment.gid, on))
         }));
         let release = self.incoming("release", &self.types.empty, inputs)?;
-        tasks.spawn(release.forward(|_, _| Some(Input::Release)));
+        tasks.spawn(release.forward(|received, _| Some(Input::Release(received.attachment.gid))));
         let watch = Watch {
             ros: self.ros.clone(),
             topic: self.topic("cmd_vel"),

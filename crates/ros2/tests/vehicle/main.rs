@@ -101,7 +101,7 @@ async fn without_rights_nothing_is_commanded_and_no_emergency_set() {
     scene
         .until(|it| it.says("rights of ROS (--rights)=20"))
         .await;
-    scene.input(Input::EmergencyStop(true)).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
     scene
         .until(|it| it.says("emergency stops refused by the rights of ROS (--rights)=1"))
         .await;
@@ -116,7 +116,7 @@ async fn a_bridge_that_may_only_stop_sets_an_emergency() {
     scene.start_vehicle();
     scene.start_bridge_with(Some("observe".to_owned()));
     scene.until(|it| it.odometry().is_some()).await;
-    scene.input(Input::EmergencyStop(true)).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
     scene.until(|it| it.says("Driver: emergency")).await;
     scene.end().await;
 }
@@ -125,13 +125,13 @@ async fn a_bridge_that_may_only_stop_sets_an_emergency() {
 async fn an_emergency_stops_the_vehicle_and_it_drives_again_only_after_a_clear_and_a_pause() {
     let scene = driveable();
     scene.drive_until(1.0, |it| it.speed() > 0.5).await;
-    scene.input(Input::EmergencyStop(true)).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
     scene.drive_until(1.0, |it| it.speed().abs() < 0.01).await;
     scene
         .drive_until(1.0, |it| it.says("Driver: emergency"))
         .await;
     // Commands that go on while it is cleared do not drive it.
-    scene.input(Input::EmergencyStop(false)).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, false)).await;
     scene.drive_until(1.0, |it| !it.says(": emergency")).await;
     for _ in 0..20 {
         scene.drive(1.0, 0.0).await;
@@ -147,7 +147,7 @@ async fn an_emergency_stops_the_vehicle_and_it_drives_again_only_after_a_clear_a
 async fn an_emergency_stop_reaches_a_vehicle_that_appears_after_it() {
     let mut scene = Scene::new();
     scene.start_bridge(Some(127));
-    scene.input(Input::EmergencyStop(true)).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
     tokio::time::sleep(Duration::from_secs(1)).await;
     scene.start_vehicle();
     scene.until(|it| it.says("Driver: emergency")).await;
@@ -158,7 +158,7 @@ async fn an_emergency_stop_reaches_a_vehicle_that_appears_after_it() {
 async fn a_release_ends_driving_although_its_publisher_goes_on() {
     let scene = driveable();
     scene.drive_until(1.0, |it| it.speed() > 0.5).await;
-    scene.input(Input::Release).await;
+    scene.input(Input::Release(PUBLISHER)).await;
     scene
         .drive_until(1.0, |it| it.says("control=not wanted"))
         .await;
@@ -199,8 +199,73 @@ async fn a_client_with_a_higher_authority_takes_the_vehicle_and_ros_does_not_tak
     scene.end().await;
 }
 
+#[tokio::test(start_paused = true)]
+async fn what_a_publisher_does_with_control_and_emergencies_is_recorded_once() {
+    let scene = driveable();
+    scene.drive_until(1.0, |it| it.speed() > 0.5).await;
+    let by = PUBLISHER.to_string();
+    let requested = format!("RequestControl from 101.252.1 to {PRIMITIVE}");
+    assert_eq!(scene.audit.count(&[&by, &requested, "Passed"]), 1);
+    assert_eq!(scene.audit.count(&[&by, "ConfirmControl", "Granted"]), 1);
+
+    let control = scene.operator.control(PRIMITIVE, 200).await.unwrap();
+    scene
+        .drive_until(1.0, |it| it.says("jaus-ros2: no control of"))
+        .await;
+    assert_eq!(scene.audit.count(&[&by, "RejectControl", "Ended"]), 1);
+    control.release().await;
+
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
+    scene.until(|it| it.says("Driver: emergency")).await;
+    assert_eq!(scene.audit.count(&[&by, "SetEmergency", "Passed"]), 1);
+    scene.input(Input::EmergencyStop(PUBLISHER, false)).await;
+    scene.until(|it| !it.says(": emergency")).await;
+    assert_eq!(scene.audit.count(&[&by, "ClearEmergency", "Passed"]), 1);
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_the_rights_of_ros_forbid_is_recorded() {
+    let mut scene = Scene::new();
+    scene.start_vehicle();
+    scene.start_bridge(None);
+    scene.until(|it| it.odometry().is_some()).await;
+    scene.drive(1.0, 0.0).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
+    let refused = |it: &Scene| it.audit.count(&[&PUBLISHER.to_string(), "Refused"]);
+    scene.until(|it| refused(it) == 2).await;
+    assert_eq!(scene.audit.count(&["SetEmergency", "Refused"]), 1);
+    scene.end().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn while_nothing_can_be_recorded_ros_stops_the_vehicle_and_does_nothing_else() {
+    let scene = driveable();
+    scene.drive_until(1.0, |it| it.speed() > 0.5).await;
+    scene.audit.set_broken(true);
+    // A stop takes effect before the timeout does.
+    scene.drive(0.0, 0.0).await;
+    tokio::time::sleep(Duration::from_millis(400)).await;
+    assert!(scene.speed() < 0.3, "{}", scene.speed());
+    for _ in 0..20 {
+        scene.drive(1.0, 0.0).await;
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    assert!(scene.speed().abs() < 0.01, "{}", scene.status());
+    assert!(scene.audit.count(&["RequestControl", "Unrecorded"]) >= 20);
+    scene.input(Input::EmergencyStop(PUBLISHER, true)).await;
+    scene.until(|it| it.says("Driver: emergency")).await;
+    scene.input(Input::EmergencyStop(PUBLISHER, false)).await;
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    assert!(scene.says("Driver: emergency"), "it is not cleared");
+    scene.audit.set_broken(false);
+    scene.input(Input::EmergencyStop(PUBLISHER, false)).await;
+    scene.until(|it| !it.says(": emergency")).await;
+    scene.end().await;
+}
+
 fn goal(east: f64, north: f64) -> Input {
-    Input::Goal(GoalPose {
+    let pose = GoalPose {
         frame: "map".to_owned(),
         position: [east, north, 0.0],
         orientation: Quaternion {
@@ -209,7 +274,8 @@ fn goal(east: f64, north: f64) -> Input {
             z: 0.0,
             w: 1.0,
         },
-    })
+    };
+    Input::Goal(PUBLISHER, pose)
 }
 
 #[tokio::test(start_paused = true)]

@@ -2,13 +2,14 @@
 
 use std::ops::{Deref, DerefMut};
 use std::panic::Location;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
-use jaus::node::now;
+use jaus::node::{DecisionRecorder, Recorder, now};
+use jaus::rights::Decided;
 use jaus_ros2::Gid;
 use jaus_ros2::bridge::samples::OdometrySample;
 use jaus_ros2::bridge::vehicle::Selection;
@@ -31,6 +32,40 @@ pub(crate) struct Scene {
     /// The number of commands.
     sequence: AtomicI64,
     seen: Arc<Mutex<Seen>>,
+    pub(crate) audit: Audit,
+}
+
+/// An audit log: what its entries are about, with their verdicts.
+#[derive(Clone, Default)]
+pub(crate) struct Audit {
+    entries: Arc<Mutex<Vec<String>>>,
+    is_broken: Arc<AtomicBool>,
+}
+
+impl Audit {
+    /// From now on it cannot be written, or can be again.
+    pub(crate) fn set_broken(&self, is_broken: bool) {
+        self.is_broken.store(is_broken, Ordering::Relaxed);
+    }
+
+    /// How many entries have all of these texts.
+    pub(crate) fn count(&self, texts: &[&str]) -> usize {
+        let entries = self.entries.lock().unwrap();
+        let has_all = |entry: &&String| texts.iter().all(|text| entry.contains(text));
+        entries.iter().filter(has_all).count()
+    }
+}
+
+impl DecisionRecorder<Gid> for Audit {
+    fn record(&mut self, decided: Decided<Gid>) {
+        let (decision, who) = (decided.decision, decided.client);
+        let entry = format!("{who}: {decision}, {:?}", decision.verdict);
+        self.entries.lock().unwrap().push(entry);
+    }
+
+    fn refuses_commands(&self) -> bool {
+        self.is_broken.load(Ordering::Relaxed)
+    }
 }
 
 impl Deref for Scene {
@@ -62,6 +97,7 @@ impl Scene {
             inputs: None,
             sequence: AtomicI64::new(0),
             seen: Arc::default(),
+            audit: Audit::default(),
         }
     }
 
@@ -92,9 +128,10 @@ impl Scene {
             }
         }));
         let bridge = bridge.unwrap();
-        let time = self.time.clone();
+        let (time, audit) = (self.time.clone(), self.audit.clone());
         self.tasks.push(tokio::spawn(async move {
-            run(bridge, time, settings, Reports::none(), received, outputs).await;
+            let (recorder, ports) = (Some(Recorder::new(audit)), (received, outputs));
+            run(bridge, time, settings, Reports::none(), recorder, ports).await;
         }));
     }
 

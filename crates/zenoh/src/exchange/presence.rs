@@ -31,7 +31,7 @@ impl Exchange {
     fn handle_declared(&mut self, now: Instant, key: &str, component: JausId, from: BridgeId) {
         let outcome = if !self.accept.accepts(component) {
             Err(Counter::NotAccepted)
-        } else if self.is_local(now, component) {
+        } else if self.is_held(now, component) {
             self.remotes.claim(from, component);
             Err(Counter::OwnId)
         } else {
@@ -121,7 +121,7 @@ impl Exchange {
                 );
                 self.queue.declare(Command::Identify(valid));
             }
-            None if self.is_local(now, component) => {
+            None if self.is_held(now, component) => {
                 tracing::warn!("{component} is a component of this side: {key} is refused");
             }
             None => {

@@ -4,6 +4,7 @@
     reason = "the tests start at an arbitrary instant"
 )]
 
+mod audit;
 mod hostile;
 
 use jaus::endpoint::{LinkId, SessionId};
@@ -300,15 +301,26 @@ fn a_bridge_that_is_found_hears_the_calls_that_it_has_missed() {
 #[test]
 fn a_component_that_changes_sides_belongs_to_its_bridge_once_it_is_silent_here() {
     let start = Instant::now();
-    let mut here = bridge(HERE, &[]);
-    here.handle_local(start, DRIVER, start);
-    announce(start, &mut here, DRIVER);
-    assert_eq!(here.counters().get(Counter::OwnId), 1);
-    let later = start + LOCAL_FOR;
-    here.expire(later);
-    // It belongs to the bridge, so it is not heard as one of this side any more.
-    here.handle_local(later, DRIVER, later);
-    assert!(!here.serves(DRIVER));
+    // An id that a rule lets come from the zenoh side, and others.
+    for (accept, is_free_after) in [(&["101 observe"][..], LOCAL_FOR), (&[], HELD_FOR)] {
+        let mut here = bridge(HERE, accept);
+        here.handle_local(start, DRIVER, start);
+        announce(start, &mut here, DRIVER);
+        assert_eq!(here.counters().get(Counter::OwnId), 1);
+        let silent = start + LOCAL_FOR;
+        here.expire(silent);
+        let free = silent + is_free_after;
+        let before = free - Duration::from_millis(1);
+        here.expire(before);
+        here.handle_local(before, DRIVER, before);
+        assert_eq!(here.serves(DRIVER), is_free_after == HELD_FOR);
+        here.expire(before + LOCAL_FOR);
+        here.expire(before + LOCAL_FOR + HELD_FOR);
+        // It belongs to the bridge, so it is not heard as one of this side any more.
+        let later = before + LOCAL_FOR + HELD_FOR;
+        here.handle_local(later, DRIVER, later);
+        assert!(!here.serves(DRIVER));
+    }
 }
 
 #[test]

@@ -42,7 +42,7 @@ fn node(subsystem: u16, accept: &[&str], routers: &[String], first: usize) -> No
         settings.accept = Acceptance::new(accept.iter().map(|it| it.parse().unwrap()));
         settings.trusts_network = true;
     }
-    let mut bridge = Bridge::new(settings, &network).unwrap();
+    let mut bridge = Bridge::new(settings, &network, None).unwrap();
     let mut config = Config::new(subsystem, 1).without_udp();
     config.limits.max_peers = 16_384;
     let node = Node::start_with(config, bridge.links()).unwrap();

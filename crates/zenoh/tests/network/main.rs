@@ -1,5 +1,5 @@
-//! Bridges as processes, joined by the router of another implementation's package. Ignored, because
-//! that package has to be installed: `.ci/zenoh` does so and runs them.
+//! Bridges as processes. Those that are joined by the router of another implementation's package are
+//! ignored, because that package has to be installed: `.ci/zenoh` does so and runs them.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -9,6 +9,7 @@
     reason = "the tests run in real time, within a limit, and fail by panicking"
 )]
 
+mod audit;
 mod fleet;
 mod scene;
 mod tls;

@@ -33,6 +33,10 @@ fn script(name: &str) -> PathBuf {
 pub(crate) struct Process(Child);
 
 impl Process {
+    pub(crate) fn start(mut program: Command) -> Self {
+        Self(program.spawn().unwrap())
+    }
+
     pub(crate) fn id(&self) -> u32 {
         self.0.id()
     }
@@ -161,7 +165,7 @@ impl System {
 
     /// Starts a bridge of this system.
     pub(crate) fn bridge(&self, id: &str, flags: &[&str]) -> Process {
-        Process(self.program(id, flags).spawn().unwrap())
+        Process::start(self.program(id, flags))
     }
 
     /// Starts a bridge of this system whose log is read.
@@ -178,7 +182,7 @@ impl System {
         (Process(child), log)
     }
 
-    fn program(&self, id: &str, flags: &[&str]) -> Command {
+    pub(crate) fn program(&self, id: &str, flags: &[&str]) -> Command {
         let mut program = Command::new(env!("CARGO_BIN_EXE_jaus-zenoh"));
         program
             .args(["--loopback", "--port", "0", "--id", id])

@@ -22,6 +22,7 @@ pub(crate) fn message(code: u16, name: &str, body: Option<Item>) -> Message {
         is_command: false,
         is_deprecated: false,
         permission: None,
+        stops: false,
         destination: None,
         description: String::new(),
         header: None,

@@ -61,9 +61,16 @@ fn decisions(world: &mut World) -> Vec<(RaId, String, Verdict)> {
         .collect()
 }
 
+/// The state that the vehicle reports to the RA operator.
+fn reported_state(world: &mut World, ra: usize) -> u8 {
+    world.ra_says(ra, &says(RA_DRIVER, 0x2002, ""));
+    world.run(Duration::from_secs(1));
+    world.ra_heard(ra, 0x4002).last().unwrap().data[0]
+}
+
 #[test]
-fn without_a_grant_an_ra_client_looks_and_neither_controls_nor_stops() {
-    let (mut world, ra) = world_granting(Acceptance::default());
+fn without_a_grant_an_ra_client_looks_and_stops_and_takes_no_control() {
+    let (mut world, ra) = world_granting(Settings::default().grants);
     world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
     world.run(Duration::from_secs(1));
     assert_eq!(world.ra_heard(ra, 0x4402).len(), 1);
@@ -76,6 +83,50 @@ fn without_a_grant_an_ra_client_looks_and_neither_controls_nor_stops() {
     assert!(decided.contains(&expected), "{decided:?}");
     assert!(
         !decided.iter().any(|it| it.2 == Verdict::Granted),
+        "{decided:?}"
+    );
+    world.ra_says(ra, &says(RA_DRIVER, 0x0006, "0100"));
+    world.run(Duration::from_secs(1));
+    let stopped = (COMMANDER, "SetEmergency".to_owned(), Verdict::Passed);
+    assert!(decisions(&mut world).contains(&stopped));
+    assert_eq!(reported_state(&mut world, ra), State::Emergency as u8);
+}
+
+#[test]
+fn the_name_of_an_ra_component_is_kept_as_received_and_escaped_where_it_is_shown() {
+    let mut world = World::new(Settings::default());
+    let name = "Commander\u{1b}[2J\nfake line";
+    world.add_ra(subsystem(30, "OCU", &[(32, 1, name)]), None);
+    world.run(Duration::from_secs(10));
+    let report = world.gateway.report();
+    let mut names = report.ra_components.iter().map(|it| it.name.as_str());
+    assert!(names.any(|it| it == name), "{report:?}");
+    let shown = report.to_string();
+    assert!(
+        !shown.contains("\u{1b}") && shown.contains(r"\u{1b}[2J\nfake line"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn while_nothing_can_be_recorded_an_ra_client_stops_and_takes_no_control() {
+    let grants = Acceptance::new(["30 control=127".parse().unwrap()]);
+    let (mut world, ra) = world_granting(grants);
+    world.gateway.refuse_commands(true);
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(2));
+    let refused = Verdict::Refused(Unaccepted::Rule(Refusal::Unrecorded));
+    let expected = (COMMANDER, "RequestControl".to_owned(), refused);
+    assert!(decisions(&mut world).contains(&expected));
+    world.ra_says(ra, &says(RA_DRIVER, 0x0006, "0100"));
+    world.run(Duration::from_secs(1));
+    assert_eq!(reported_state(&mut world, ra), State::Emergency as u8);
+    world.gateway.refuse_commands(false);
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(2));
+    let decided = decisions(&mut world);
+    assert!(
+        decided.iter().any(|it| it.2 == Verdict::Passed),
         "{decided:?}"
     );
 }
