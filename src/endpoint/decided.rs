@@ -6,7 +6,7 @@ use super::arrival::Arrival;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Outgoing, Remote};
 use crate::rights::{
-    self, Admitted, Decision, DecisionQueue, Unaccepted, check_unrecorded, denial,
+    self, Admitted, Decision, DecisionQueue, Told, Unaccepted, check_unrecorded, denial,
 };
 use crate::wire::Frame;
 
@@ -21,6 +21,7 @@ pub(super) struct Decisions {
     /// Whether what changes something is refused, because it could not be recorded.
     is_refusing: bool,
     waiting: DecisionQueue<Remote>,
+    told: Told,
 }
 
 impl Endpoint {
@@ -88,7 +89,8 @@ impl Endpoint {
         }
         let (client, payload) = (message.destination, message.payload.clone());
         let frame = Frame::new(message.source, client, payload);
-        if let Some(told) = Decision::told_by(&frame, &self.config.access.table)
+        let table = &self.config.access.table;
+        if let Some(told) = self.decisions.told.decision(&frame, table)
             && let Some((path, _)) = self.route(client)
         {
             self.record(told, path.peer);

@@ -4,12 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use super::carried::{self, Carried};
-use super::{Permission, Refusal, Rules, Table, Unaccepted, is_later, is_recorded, table};
+use super::{Permission, Refusal, Rules, Table, Unaccepted, begins, is_recorded, table};
 use crate::address::JausId;
 use crate::codec::Message as _;
-use crate::messages::core::{
-    ConfirmControl, RejectControl, RequestControl, confirm_control::ResponseCode,
-};
+use crate::messages::core::{ConfirmControl, RequestControl, confirm_control::ResponseCode};
 use crate::wire::{Flags, Frame};
 
 /// Names of carried messages that a decision lists. Further ones are counted.
@@ -39,7 +37,8 @@ pub struct Decision {
     pub destination: JausId,
     /// What was decided.
     pub verdict: Verdict,
-    /// Whether a message that passed needs no right, such as Release Control.
+    /// Whether a message that passed needs no right, such as Release Control; or control has ended that was
+    /// not granted before.
     pub is_free: bool,
 }
 
@@ -93,27 +92,7 @@ impl Decision {
         }
     }
 
-    /// The decision that a component tells its client by this frame: `None` if it is about something
-    /// else than control.
-    #[must_use]
-    pub fn told_by(frame: &Frame, table: &Table) -> Option<Self> {
-        if !begins(frame) {
-            return None;
-        }
-        let answer = table.needs(&frame.payload).find_map(|it| match it {
-            Permission::Answer { is_granted } => Some(is_granted),
-            _ => None,
-        });
-        let verdict = match answer {
-            Some(true) => Verdict::Granted,
-            Some(false) => Verdict::Denied,
-            None if frame.code() == Some(RejectControl::CODE) => Verdict::Ended,
-            None => return None,
-        };
-        Some(Self::new(frame, table.name_of(&frame.payload), verdict))
-    }
-
-    fn new(frame: &Frame, what: String, verdict: Verdict) -> Self {
+    pub(super) fn new(frame: &Frame, what: String, verdict: Verdict) -> Self {
         Self {
             what,
             source: frame.source,
@@ -133,8 +112,8 @@ impl Decision {
     #[must_use]
     pub const fn weight(&self) -> Weight {
         match self.verdict {
-            Verdict::Refused(_) => Weight::Refusal,
-            Verdict::Passed if self.is_free => Weight::Free,
+            Verdict::Refused(_) | Verdict::Denied => Weight::Refusal,
+            Verdict::Passed | Verdict::Ended if self.is_free => Weight::Free,
             _ => Weight::Evidence,
         }
     }
@@ -220,11 +199,6 @@ impl Inside {
 fn needs_nothing(message: &[u8], table: &Table) -> bool {
     let mut needs = table.needs(message).peekable();
     needs.peek().is_some() && needs.all(Permission::needs_no_right)
-}
-
-/// Whether a frame has the beginning of a message, and so its code.
-fn begins(frame: &Frame) -> bool {
-    !is_later(frame) && !frame.is_acknowledgement()
 }
 
 /// Checks a frame while nothing can be recorded: what only queries, ends or stops ([`Table::stops`]), passes.
@@ -375,30 +349,8 @@ mod tests {
     }
 
     #[test]
-    fn what_a_component_tells_about_control_is_told_apart() {
-        let table = Table::default();
-        let told = |payload: &[u8]| {
-            let told = Decision::told_by(&frame(payload), &table)?;
-            Some((told.what, told.verdict))
-        };
-        let some = |what: &str, verdict| Some((what.to_owned(), verdict));
-        for (payload, expected) in [
-            (
-                &b"\x0F\x00\x00"[..],
-                some("ConfirmControl", Verdict::Granted),
-            ),
-            (b"\x0F\x00\x02", some("ConfirmControl", Verdict::Denied)),
-            (
-                b"\x35\xFF\x01\x00",
-                some("ConfirmHandoffRequest", Verdict::Granted),
-            ),
-            (b"\x10\x00\x00", some("RejectControl", Verdict::Ended)),
-            (b"\x0E\x00", None),
-            (b"\x39\xFF\x00", None),
-        ] {
-            assert_eq!(told(payload), expected);
-        }
-        // The decision of the client in control about others is no release, and needs a right.
+    fn a_decision_of_the_client_in_control_about_others_is_no_release() {
+        // It needs a right.
         let decides = decided("control=1", b"\x39\xFF\x01\x01\x00").unwrap();
         assert_eq!(decides.what, "ConfirmReleaseControl");
         assert!(decided("", b"\x39\xFF\x01\x01\x00").unwrap().is_refusal());

@@ -59,6 +59,7 @@ mod decision;
 mod queue;
 mod selection;
 mod table;
+mod told;
 mod words;
 
 pub(crate) use accept::admit as admit_by_grants;
@@ -67,6 +68,7 @@ pub use decision::{Decision, Verdict, Weight, check_unrecorded, denial};
 pub use queue::{Decided, DecisionQueue, Weighted, WeightedQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
+pub use told::Told;
 pub use words::RuleError;
 
 use crate::address::JausId;
@@ -386,6 +388,11 @@ fn is_later(frame: &Frame) -> bool {
     matches!(frame.flags.data(), DataControl::Middle | DataControl::Last)
 }
 
+/// Whether a frame has the beginning of a message, and so its code.
+fn begins(frame: &Frame) -> bool {
+    !is_later(frame) && !frame.is_acknowledgement()
+}
+
 /// Whether every fragment has the message code, as with the headers before AS5669A: then each is
 /// checked by its own.
 fn repeats_code(frame: &Frame) -> bool {
@@ -396,7 +403,7 @@ fn repeats_code(frame: &Frame) -> bool {
 /// not held. See [`Table::is_recorded`].
 #[must_use]
 pub fn is_recorded(frame: &Frame, table: &Table) -> bool {
-    !is_later(frame) && !frame.is_acknowledgement() && table.is_recorded(&frame.payload)
+    begins(frame) && table.is_recorded(&frame.payload)
 }
 
 /// As much of a text as an error shows.

@@ -11,10 +11,12 @@
 mod session;
 mod users;
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use tokio::sync::{Semaphore, watch};
+use jaus_limits::Yielding;
+use tokio::sync::watch;
+use tokio::task::AbortHandle;
 use tokio::time::timeout;
 
 use self::session::Session;
@@ -30,7 +32,8 @@ use crate::link::local::record::{
 };
 use crate::link::local::{Credentials, Error, Listener, Process, Reader, Stream, Writer};
 
-/// Limit of connections whose component is not attached yet.
+/// Limit of connections whose component is not attached yet. If there are more, the oldest of the user with
+/// the most gives way, so that no number of silent ones keeps a component out.
 const UNATTACHED: usize = 32;
 /// How long a component may take to send its first record, and to read a refusal.
 const HANDSHAKE: Duration = Duration::from_secs(5);
@@ -48,22 +51,29 @@ pub(super) async fn serve(
     _listening: watch::Receiver<()>,
     listener: Listener,
 ) {
-    let unattached = Arc::new(Semaphore::new(UNATTACHED));
-    while let Ok(permit) = unattached.clone().acquire_owned().await {
+    let mut unattached = Yielding::new(UNATTACHED);
+    loop {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
             () = shared.stopped() => return,
         };
         match accepted {
             Ok(stream) => {
-                let shared = shared.clone();
-                tokio::spawn(async move {
+                let user = stream.peer.uid;
+                let (shared, attaching) = (shared.clone(), Arc::new(()));
+                let is_attaching = Arc::downgrade(&attaching);
+                let task = tokio::spawn(async move {
                     let attached = attach(&shared, stream).await;
-                    drop(permit);
+                    drop(attaching);
                     if let Some((session, reader)) = attached {
                         session.run(reader).await;
                     }
                 });
+                let is_done = |(it, _): &(Weak<()>, AbortHandle)| it.strong_count() == 0;
+                let holder = (is_attaching, task.abort_handle());
+                if let Some((_, oldest)) = unattached.add(user, holder, is_done) {
+                    oldest.abort();
+                }
             }
             Err(error) => {
                 tracing::warn!(%error, "cannot accept a component");

@@ -10,18 +10,16 @@ use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use jaus_limits::{Places, Source};
+use jaus_limits::{Source, Yielding};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, sleep, timeout};
 
 use super::exposition::Format;
 
-/// Connections at once.
+/// Connections at once. If there are more, one of the address with the most gives way.
 const MOST: usize = 16;
-/// Connections of one address.
-const SHARE: usize = 8;
 /// Time for a whole connection, from its first octet to its last.
 const DEADLINE: Duration = Duration::from_secs(5);
 /// Largest request header in octets.
@@ -63,7 +61,7 @@ impl Server {
 
     /// Serves for as long as the program runs.
     pub(super) async fn run(self, listener: TcpListener) {
-        let places = Places::new(MOST, SHARE);
+        let mut open = Yielding::new(MOST);
         let server = Arc::new(self);
         let mut tasks = JoinSet::new();
         loop {
@@ -79,17 +77,17 @@ impl Server {
                     continue;
                 }
             };
-            let Ok(place) = places.take(Source::of(address)) else {
-                tracing::debug!(%address, "too many connections for metrics");
-                continue;
-            };
             let server = server.clone();
-            tasks.spawn(async move {
+            let task = tasks.spawn(async move {
                 if let Err(error) = server.serve(stream).await {
                     tracing::debug!(%address, %error, "no metrics sent");
                 }
-                drop(place);
             });
+            let oldest = open.add(Source::of(address), task, AbortHandle::is_finished);
+            if let Some(oldest) = oldest {
+                tracing::debug!(%address, "too many connections for metrics: one is closed");
+                oldest.abort();
+            }
         }
     }
 

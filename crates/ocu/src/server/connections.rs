@@ -1,4 +1,4 @@
-//! Browser connections: their number in all and for each address, and the deadlines of handshakes,
+//! Browser connections: their number, and the deadlines of handshakes,
 //! request headers and silence.
 
 use std::io;
@@ -15,20 +15,20 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use jaus_limits::{Place, Places, Source};
+use jaus_limits::{Source, Yielding};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
-use tokio::task::JoinSet;
+use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, Sleep, sleep, timeout};
 use tower::ServiceExt;
 
 use crate::tls::Tls;
 
-/// Connection limit: more than all pages need, and far below the usual limit of open files.
+/// Connections with requests, besides the sockets of pages: more than all pages need, and far below the usual
+/// limit of open files. If there are more, one of the address with the most gives way, so that no number of
+/// addresses keeps a browser out.
 const MOST: usize = 256;
-/// Connections of one address: eight pages with six requests each, and their three sockets.
-const SHARE: usize = 72;
 /// Deadline of a TLS handshake.
 const HANDSHAKE: Duration = Duration::from_secs(10);
 /// Deadline of a request's header, also of the next one on the same connection.
@@ -39,9 +39,6 @@ const SILENCE: Duration = Duration::from_secs(30);
 const PAUSE: Duration = Duration::from_millis(100);
 /// First octet of a TLS handshake.
 const TLS_HANDSHAKE: u8 = 22;
-/// Response when the connection limit is reached.
-const NO_PLACE: &[u8] =
-    b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
 /// Response to a request without TLS on a port with TLS.
 const NO_TLS: &[u8] = b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\n\
     Content-Length: 43\r\nConnection: close\r\n\r\nthis page requires https:// in its address\n";
@@ -51,7 +48,7 @@ pub(crate) type MemoryBrowsers = mpsc::Receiver<(DuplexStream, SocketAddr)>;
 
 /// Serves connections for as long as the listener works.
 pub(super) async fn serve(listener: TcpListener, tls: Option<Tls>, router: Router) {
-    let places = Places::new(MOST, SHARE);
+    let mut requesting = Yielding::new(MOST);
     let mut tasks = JoinSet::new();
     loop {
         let accepted = tokio::select! {
@@ -66,16 +63,14 @@ pub(super) async fn serve(listener: TcpListener, tls: Option<Tls>, router: Route
                 continue;
             }
         };
-        match places.take(Source::of(address)) {
-            Ok(place) => {
-                let connection = Connection::new(stream, place);
-                tasks.spawn(serve_one(connection, address, tls.clone(), router.clone()));
-            }
-            Err(why) => {
-                tracing::debug!(%address, ?why, "too many connections");
-                // Best effort: never wait for the peer.
-                let _ = stream.try_write(NO_PLACE);
-            }
+        let connection = Connection::new(stream);
+        let serving = serve_one(connection, address, tls.clone(), router.clone());
+        // The task ends when a socket begins, which has a limit of its own.
+        let task = tasks.spawn(serving);
+        let source = Source::of(address);
+        if let Some(oldest) = requesting.add(source, task, AbortHandle::is_finished) {
+            tracing::debug!(%address, "too many connections: one of those with requests is closed");
+            oldest.abort();
         }
     }
 }
@@ -137,21 +132,19 @@ where
     }
 }
 
-/// A connection with an idle timeout, which has a place until it ends.
+/// A connection with an idle timeout.
 struct Connection {
     stream: TcpStream,
     silence: Pin<Box<Sleep>>,
-    _place: Place,
 }
 
 impl Connection {
-    fn new(stream: TcpStream, place: Place) -> Self {
+    fn new(stream: TcpStream) -> Self {
         // Send small snapshots and commands without delay. A failure only adds latency.
         let _ = stream.set_nodelay(true);
         Self {
             stream,
             silence: Box::pin(sleep(SILENCE)),
-            _place: place,
         }
     }
 

@@ -60,7 +60,7 @@ impl Gateway {
         };
         let ra = proxy.ra();
         let frame = Frame::new(message.source, message.to, message.payload.clone());
-        if let Some(told) = Decision::told_by(&frame, &Table::default()) {
+        if let Some(told) = self.told.decision(&frame, &Table::default()) {
             self.record(now, told, ra);
         }
     }

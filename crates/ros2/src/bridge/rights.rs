@@ -15,7 +15,9 @@ use jaus::messages::mobility::{
     SetLocalWaypoint, SetTravelSpeed, SetVelocityCommand, SetWrenchEffort,
 };
 use jaus::node::Recorder;
-use jaus::rights::{Decision, DecisionQueue, Refusal, Rules, Table, Unaccepted, check_unrecorded};
+use jaus::rights::{
+    Decision, DecisionQueue, Refusal, Rules, Table, Told, Unaccepted, check_unrecorded,
+};
 use jaus::wire::Frame;
 use jaus_vehicle::messages::ground::{SetDestination, StopMission};
 
@@ -34,6 +36,7 @@ pub(super) struct Rights {
     /// All components of the vehicle, for messages whose component is not known yet.
     vehicle: JausId,
     recorder: Option<Recorder<Gid>>,
+    told: Told,
 }
 
 /// A message that the bridge does not send.
@@ -74,6 +77,7 @@ impl Rights {
             from,
             vehicle: JausId::new(subsystem, JausId::ANY_NODE, JausId::ANY_COMPONENT),
             recorder,
+            told: Told::default(),
         }
     }
 
@@ -208,7 +212,8 @@ impl Rights {
         };
         let Ok(message) = message else { return };
         let told = Frame::new(component, self.from, message);
-        self.record(by, Decision::told_by(&told, &self.table));
+        let decision = self.told.decision(&told, &self.table);
+        self.record(by, decision);
     }
 
     fn record(&mut self, by: Gid, decision: Option<Decision>) {

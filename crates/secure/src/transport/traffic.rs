@@ -92,7 +92,7 @@ impl Transport {
             return;
         };
         for frame in frames.map_while(Result::ok) {
-            if let Some(told) = Decision::told_by(&frame, &self.table) {
+            if let Some(told) = self.told.decision(&frame, &self.table) {
                 self.record(id, Act::Decided(told));
             }
         }

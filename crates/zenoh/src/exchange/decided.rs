@@ -62,7 +62,7 @@ impl Exchange {
     /// Records what a component of this side tells a client of a bridge about its control.
     pub(super) fn record_answer(&mut self, frame: &Frame, to: Recipient) {
         if let Recipient::Bridge(client) = to
-            && let Some(told) = Decision::told_by(frame, &self.table)
+            && let Some(told) = self.told.decision(frame, &self.table)
         {
             self.record(told, client);
         }
