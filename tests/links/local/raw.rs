@@ -2,6 +2,7 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::link::local::record::{Head, Reason, Record};
@@ -149,6 +150,19 @@ async fn a_connection_that_begins_with_something_else_is_closed() {
     })
     .await;
     assert_eq!(read, 0);
+}
+
+#[tokio::test]
+async fn silent_connections_keep_no_component_out() {
+    let place = Place::new();
+    let _node = place.node();
+    let path = place.path().to_owned();
+    let connect = move || (0..100).map(|_| UnixStream::connect(&path).unwrap());
+    let silent = blocking(move || connect().collect::<Vec<_>>()).await;
+    // Sooner than the node waits for what a connection says.
+    let attached = tokio::time::timeout(Duration::from_secs(3), place.host().attach(33)).await;
+    attached.unwrap().unwrap();
+    drop(silent);
 }
 
 #[tokio::test]
