@@ -166,6 +166,16 @@ impl Key {
         Self::parse(path, &read(path)?)
     }
 
+    /// Loads a key again and again: that of a token only once, because it does not change, and a slow token
+    /// would stall the node.
+    pub(crate) fn reader(
+        path: &Path,
+    ) -> Result<impl Fn() -> Result<Self, KeyError> + use<>, KeyError> {
+        let kept = Self::is_in_token(path).then(|| Self::load(path));
+        let (kept, path) = (kept.transpose()?, path.to_owned());
+        Ok(move || kept.clone().map_or_else(|| Self::load(&path), Ok))
+    }
+
     fn parse(path: &Path, pem: &[u8]) -> Result<Self, KeyError> {
         if is_sealed(pem) {
             return Err(KeyError::Sealed(path.to_owned()));

@@ -9,6 +9,8 @@ use jaus_test_kit::tools;
 use tempfile::TempDir;
 
 use super::*;
+use crate::credentials::Credentials;
+use crate::trust::TrustFile;
 
 /// Where distributions have the library.
 const LIBRARIES: [&str; 3] = [
@@ -125,6 +127,27 @@ fn a_session_is_opened_again() {
     library.finalize().unwrap();
     let signature = made.sign(b"message").unwrap();
     assert!(made.public().has_signed(b"message", &signature));
+}
+
+#[test]
+fn the_files_of_a_node_are_read_again_without_its_token() {
+    if let Some(token) = Token::new() {
+        token.run("files_are_read_again", "token=rover;object=node");
+    }
+}
+
+#[test]
+#[ignore = "run by another test with a token"]
+fn files_are_read_again() {
+    let made = Key::create(&uri()).unwrap();
+    let credentials = Credentials::load(&uri(), TrustFile::default()).unwrap();
+    // The token is gone.
+    let module = TokenUri::parse(uri().to_str().unwrap()).unwrap().module;
+    Pkcs11::new(module).unwrap().finalize().unwrap();
+    let settings = PathBuf::from(std::env::var_os("SOFTHSM2_CONF").unwrap());
+    fs::remove_dir_all(settings.with_file_name("tokens")).unwrap();
+    credentials.reload().unwrap();
+    assert_eq!(credentials.public(), made.public());
 }
 
 #[test]
