@@ -429,13 +429,9 @@ mod tests {
         let other = Key::create(&folder.path().join("other.key")).unwrap();
         assert_ne!(other.public(), key.public());
 
-        let secret: String = fs::read_to_string(&path)
-            .unwrap()
-            .lines()
-            .skip(1)
-            .take(1)
-            .collect();
-        assert!(!format!("{key:?}").contains(&secret));
+        let text = fs::read_to_string(&path).unwrap();
+        let secret = text.lines().nth(1).unwrap();
+        assert!(!format!("{key:?}").contains(secret));
         assert!(format!("{key:?}").contains(&key.public().to_string()));
     }
 
@@ -456,10 +452,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node.key");
         Key::create(&path).unwrap();
-        assert_eq!(
-            fs::metadata(&path).unwrap().permissions().mode() & 0o777,
-            0o600
-        );
+        let mode = fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
         for mode in [0o640, 0o604, 0o644, 0o620] {
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
             let error = Key::load(&path).unwrap_err().to_string();
@@ -472,21 +466,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node.key");
         assert!(matches!(Key::load(&path), Err(KeyError::File { .. })));
-        let whole = {
-            Key::create(&path).unwrap();
-            fs::read_to_string(&path).unwrap()
-        };
-        for text in [
-            "",
-            "no key",
+        Key::create(&path).unwrap();
+        let whole = fs::read_to_string(&path).unwrap();
+        let (half, public) = (
             &whole[..whole.len() / 2],
-            &whole.replace("PRIVATE", "PUBLIC"),
-        ] {
+            whole.replace("PRIVATE", "PUBLIC"),
+        );
+        for text in ["", "no key", half, &public] {
             fs::write(&path, text).unwrap();
-            assert!(
-                matches!(Key::load(&path), Err(KeyError::Malformed(_))),
-                "{text}"
-            );
+            let loaded = Key::load(&path);
+            assert!(matches!(loaded, Err(KeyError::Malformed(_))), "{text}");
         }
     }
 
@@ -496,13 +485,8 @@ mod tests {
         assert_eq!(key.to_string().len(), 44);
         assert_eq!(key.to_string().parse::<PublicKey>().unwrap(), key);
         assert_eq!(PublicKey::from_spki(key.spki().as_ref()), Some(key));
-        for text in [
-            "",
-            "rover",
-            "AAAA",
-            &BASE64.encode([7; 31]),
-            &BASE64.encode([7; 33]),
-        ] {
+        let (short, long) = (BASE64.encode([7; 31]), BASE64.encode([7; 33]));
+        for text in ["", "rover", "AAAA", &short, &long] {
             assert!(text.parse::<PublicKey>().is_err(), "{text}");
         }
     }
