@@ -85,8 +85,8 @@ impl Credentials {
     /// # Errors
     /// If the key file cannot be used.
     pub fn load(key: &Path, trust: TrustFile) -> Result<Self, CertificateError> {
-        let path = key.to_owned();
-        let own = Followed::load(Key::files(key), move || Identity::load(&path, None))?;
+        let read = Key::reader(key)?;
+        let own = Followed::load(Key::files(key), move || Identity::of(read()?, None))?;
         Ok(Self::new(own, trust, None))
     }
 
@@ -101,10 +101,10 @@ impl Credentials {
         trust: TrustFile,
         now: SystemTime,
     ) -> Result<Self, CredentialsError> {
-        let (key, path) = (key.to_owned(), files.certificate.clone());
-        let mut followed = Key::files(&key);
+        let read = Key::reader(key).map_err(CertificateError::from)?;
+        let (mut followed, path) = (Key::files(key), files.certificate.clone());
         followed.push(path.clone());
-        let own = Followed::load(followed, move || Identity::load(&key, Some(&path)))?;
+        let own = Followed::load(followed, move || Identity::of(read()?, Some(&path)))?;
         let (certificate, revoked) = (files.authority.clone(), files.revoked.clone());
         let paths = [certificate.clone()].into_iter().chain(revoked.clone());
         let authority = Followed::load(paths.collect(), move || {
@@ -287,8 +287,7 @@ impl Credentials {
 }
 
 impl Identity {
-    fn load(key: &Path, certificate: Option<&Path>) -> Result<Self, CertificateError> {
-        let key = Key::load(key)?;
+    fn of(key: Key, certificate: Option<&Path>) -> Result<Self, CertificateError> {
         let Some(path) = certificate else {
             let certificate = None;
             return Ok(Self { key, certificate });

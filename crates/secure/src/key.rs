@@ -166,6 +166,16 @@ impl Key {
         Self::parse(path, &read(path)?)
     }
 
+    /// Loads a key again and again: that of a token only once, because it does not change, and a slow token
+    /// would stall the node.
+    pub(crate) fn reader(
+        path: &Path,
+    ) -> Result<impl Fn() -> Result<Self, KeyError> + use<>, KeyError> {
+        let kept = Self::is_in_token(path).then(|| Self::load(path));
+        let (kept, path) = (kept.transpose()?, path.to_owned());
+        Ok(move || kept.clone().map_or_else(|| Self::load(&path), Ok))
+    }
+
     fn parse(path: &Path, pem: &[u8]) -> Result<Self, KeyError> {
         if is_sealed(pem) {
             return Err(KeyError::Sealed(path.to_owned()));
@@ -419,13 +429,9 @@ mod tests {
         let other = Key::create(&folder.path().join("other.key")).unwrap();
         assert_ne!(other.public(), key.public());
 
-        let secret: String = fs::read_to_string(&path)
-            .unwrap()
-            .lines()
-            .skip(1)
-            .take(1)
-            .collect();
-        assert!(!format!("{key:?}").contains(&secret));
+        let text = fs::read_to_string(&path).unwrap();
+        let secret = text.lines().nth(1).unwrap();
+        assert!(!format!("{key:?}").contains(secret));
         assert!(format!("{key:?}").contains(&key.public().to_string()));
     }
 
@@ -446,10 +452,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node.key");
         Key::create(&path).unwrap();
-        assert_eq!(
-            fs::metadata(&path).unwrap().permissions().mode() & 0o777,
-            0o600
-        );
+        let mode = fs::metadata(&path).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
         for mode in [0o640, 0o604, 0o644, 0o620] {
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
             let error = Key::load(&path).unwrap_err().to_string();
@@ -462,21 +466,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("node.key");
         assert!(matches!(Key::load(&path), Err(KeyError::File { .. })));
-        let whole = {
-            Key::create(&path).unwrap();
-            fs::read_to_string(&path).unwrap()
-        };
-        for text in [
-            "",
-            "no key",
+        Key::create(&path).unwrap();
+        let whole = fs::read_to_string(&path).unwrap();
+        let (half, public) = (
             &whole[..whole.len() / 2],
-            &whole.replace("PRIVATE", "PUBLIC"),
-        ] {
+            whole.replace("PRIVATE", "PUBLIC"),
+        );
+        for text in ["", "no key", half, &public] {
             fs::write(&path, text).unwrap();
-            assert!(
-                matches!(Key::load(&path), Err(KeyError::Malformed(_))),
-                "{text}"
-            );
+            let loaded = Key::load(&path);
+            assert!(matches!(loaded, Err(KeyError::Malformed(_))), "{text}");
         }
     }
 
@@ -486,13 +485,8 @@ mod tests {
         assert_eq!(key.to_string().len(), 44);
         assert_eq!(key.to_string().parse::<PublicKey>().unwrap(), key);
         assert_eq!(PublicKey::from_spki(key.spki().as_ref()), Some(key));
-        for text in [
-            "",
-            "rover",
-            "AAAA",
-            &BASE64.encode([7; 31]),
-            &BASE64.encode([7; 33]),
-        ] {
+        let (short, long) = (BASE64.encode([7; 31]), BASE64.encode([7; 33]));
+        for text in ["", "rover", "AAAA", &short, &long] {
             assert!(text.parse::<PublicKey>().is_err(), "{text}");
         }
     }

@@ -142,10 +142,9 @@ impl SecureLink {
     /// As [`open`](Self::open).
     pub fn open_with(credentials: Credentials, settings: Settings) -> Result<Self, OpenError> {
         let address = settings.listen;
-        let socket =
-            Socket::bind(address).map_err(|source| OpenError::Listen { address, source })?;
-        let local = socket.local_addr();
-        let local = local.map_err(|source| OpenError::Listen { address, source })?;
+        let failed = |source| OpenError::Listen { address, source };
+        let socket = Socket::bind(address).map_err(failed)?;
+        let local = socket.local_addr().map_err(failed)?;
         let announce = settings.announce;
         let beacons = announce.map(|it| Beacons::open(credentials.clone(), local, it));
         tracing::info!(listening = %local, key = %credentials.public(), "secure link opened");

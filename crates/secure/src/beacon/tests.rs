@@ -60,8 +60,12 @@ impl Scene {
         self.beacon(seconds).sign(&self.rover).unwrap()
     }
 
+    fn handle(&mut self, from: SocketAddr, datagram: &[u8]) -> Option<Sighting> {
+        self.operator.handle(self.now, from, datagram)
+    }
+
     fn hears(&mut self, datagram: &[u8]) -> Option<SocketAddr> {
-        let sighting = self.operator.handle(self.now, from(1), datagram)?;
+        let sighting = self.handle(from(1), datagram)?;
         assert_eq!(sighting.key, self.rover.public());
         Some(sighting.address)
     }
@@ -176,7 +180,7 @@ fn beacons_of_other_keys_and_other_ids_are_ignored() {
 fn a_beacon_from_another_address_than_its_own_leads_nowhere() {
     let mut scene = Scene::new();
     let beacon = scene.signed(1);
-    assert_eq!(scene.operator.handle(scene.now, from(66), &beacon), None);
+    assert_eq!(scene.handle(from(66), &beacon), None);
     let portless = Beacon {
         port: 0,
         ..scene.beacon(1)
@@ -216,7 +220,7 @@ fn a_flood_costs_few_signature_checks_and_keeps_no_other_address_out() {
         ..scene.beacon(1)
     };
     let honest = honest.sign(&scene.rover).unwrap();
-    let sighting = scene.operator.handle(scene.now, from(2), &honest);
+    let sighting = scene.handle(from(2), &honest);
     assert_eq!(sighting.unwrap().address.ip(), from(2).ip());
 }
 
@@ -230,10 +234,7 @@ fn a_flood_from_invented_addresses_costs_a_bounded_number_of_signature_checks() 
             ..scene.beacon(2)
         };
         let from = SocketAddr::new(address, 40_000);
-        assert_eq!(
-            scene.operator.handle(scene.now, from, &forged(&beacon)),
-            None
-        );
+        assert_eq!(scene.handle(from, &forged(&beacon)), None);
     }
     // One for each address that has a limit of its own, and the burst of the others.
     let forged = scene.count(Counter::Forged);
@@ -257,9 +258,7 @@ fn a_peer_in_sight_stays_so_while_a_forger_invents_addresses_with_its_fingerprin
                 address: from(host).ip(),
                 ..scene.beacon(1000)
             };
-            let sighting = scene
-                .operator
-                .handle(scene.now, from(host), &forged(&beacon));
+            let sighting = scene.handle(from(host), &forged(&beacon));
             assert_eq!(sighting, None);
         }
         let honest = scene.signed(second);
@@ -285,7 +284,7 @@ fn beacons_forged_with_one_fingerprint_keep_no_other_key_at_that_address_out() {
         ..scene.beacon(1)
     };
     let beacon = beacon.sign(&other).unwrap();
-    assert!(scene.operator.handle(scene.now, from(1), &beacon).is_some());
+    assert!(scene.handle(from(1), &beacon).is_some());
 }
 
 #[test]

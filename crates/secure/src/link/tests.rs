@@ -21,6 +21,13 @@ use jaus::rights::Rules;
 /// Longer than any step takes.
 const LIMIT: Duration = Duration::from_secs(20);
 
+const IDS: [&str; 2] = ["101.255.255", "60.255.255"];
+
+/// What comes of this before the limit.
+async fn within<T>(done: impl Future<Output = T>) -> T {
+    tokio::time::timeout(LIMIT, done).await.expect("an answer")
+}
+
 fn key(folder: &tempfile::TempDir, name: &str) -> Key {
     Key::create(&folder.path().join(name)).unwrap()
 }
@@ -34,14 +41,14 @@ fn trusting(name: &str, key: &Key, ids: &str) -> TrustFile {
     }]))
 }
 
-/// The link of a rover, and that of a client which dials it.
-fn linked(folder: &tempfile::TempDir) -> (SecureLink, SecureLink) {
+/// The link of a rover, and that of a client which dials it, with these ids.
+fn linked(folder: &tempfile::TempDir, ids: [&str; 2]) -> (SecureLink, SecureLink) {
     let keys = ["rover", "client"].map(|name| key(folder, name));
     let any = "127.0.0.1:0".parse().unwrap();
-    let trust = trusting("client", &keys[1], "60.255.255");
+    let trust = trusting("client", &keys[1], ids[1]);
     let at_rover = SecureLink::open(&keys[0], trust, Settings::new(any)).unwrap();
     let settings = Settings::new(any).connect(at_rover.local().unwrap());
-    let trust = trusting("rover", &keys[0], "101.255.255");
+    let trust = trusting("rover", &keys[0], ids[0]);
     let at_client = SecureLink::open(&keys[1], trust, settings).unwrap();
     (at_rover, at_client)
 }
@@ -67,7 +74,7 @@ fn client(node: &Node) -> Component {
 #[tokio::test]
 async fn a_sensor_is_found_queried_and_subscribed_over_a_secure_link_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let (at_rover, at_client) = linked(&folder);
+    let (at_rover, at_client) = linked(&folder, IDS);
     let nodes = [node(101, at_rover), node(60, at_client)];
     let (rover, client) = (sensor(&nodes[0]), client(&nodes[1]));
     let mut report = ReportAccelerationState::default();
@@ -93,9 +100,7 @@ async fn a_sensor_is_found_queried_and_subscribed_over_a_secure_link_alone() {
             }
         }
     };
-    tokio::time::timeout(LIMIT, exchange)
-        .await
-        .expect("an answer");
+    within(exchange).await;
     for node in nodes {
         node.shutdown().await;
     }
@@ -137,9 +142,7 @@ async fn a_relay_joins_nodes_that_have_no_link_with_each_other() {
         let query = QueryAccelerationState::none().with_acceleration_x();
         client.query(found, &query).await.unwrap();
     };
-    tokio::time::timeout(LIMIT, exchange)
-        .await
-        .expect("an answer");
+    within(exchange).await;
     for node in nodes {
         node.shutdown().await;
     }
@@ -149,14 +152,7 @@ async fn a_relay_joins_nodes_that_have_no_link_with_each_other() {
 async fn who_comes_first_with_the_id_of_a_peer_on_a_plain_link_gets_none_of_its_messages() {
     const ROVER: u16 = 11_501;
     let folder = tempfile::tempdir().unwrap();
-    let (rover_key, client_key) = (key(&folder, "rover"), key(&folder, "client"));
-    let any = "127.0.0.1:0".parse().unwrap();
-    let trust = trusting("client", &client_key, "11502.255.255");
-    let at_rover = SecureLink::open(&rover_key, trust, Settings::new(any)).unwrap();
-    let settings = Settings::new(any).connect(at_rover.local().unwrap());
-    let trust = trusting("rover", &rover_key, "11501.255.255");
-    let at_client = SecureLink::open(&client_key, trust, settings).unwrap();
-
+    let (at_rover, at_client) = linked(&folder, ["11501.255.255", "11502.255.255"]);
     let config = Config::loopback(ROVER, 1);
     let at_rover = Node::start_with(config, vec![Box::new(at_rover)]).unwrap();
     let rover = sensor(&at_rover);
@@ -176,21 +172,19 @@ async fn who_comes_first_with_the_id_of_a_peer_on_a_plain_link_gets_none_of_its_
         assert!(forged.query(rover.id(), &query).await.is_err());
         truly.query(rover.id(), &query).await.unwrap();
     };
-    tokio::time::timeout(LIMIT, exchange)
-        .await
-        .expect("an answer");
+    within(exchange).await;
 }
 
 #[tokio::test]
 async fn a_node_that_is_shut_down_tells_its_peers() {
     let folder = tempfile::tempdir().unwrap();
-    let (at_rover, mut at_client) = linked(&folder);
+    let (at_rover, mut at_client) = linked(&folder, IDS);
     let peers = [at_rover.local().unwrap()];
     let rover = node(101, at_rover);
     assert!(at_client.probe(&peers, LIMIT).await[0].is_ok());
     rover.shutdown().await;
     let closed = std::future::poll_fn(|cx| at_client.poll_receive(cx, node::now()));
-    let closed = tokio::time::timeout(LIMIT, closed).await.unwrap();
+    let closed = within(closed).await;
     assert!(matches!(closed, Arrival::Closed(_)), "{closed:?}");
     let reason = std::iter::from_fn(|| at_client.transport.poll_record()).find_map(
         |(record, _)| match record.act {
@@ -204,7 +198,7 @@ async fn a_node_that_is_shut_down_tells_its_peers() {
 #[tokio::test]
 async fn the_counters_of_a_link_are_in_the_reports_of_its_node() {
     let folder = tempfile::tempdir().unwrap();
-    let (at_rover, _) = linked(&folder);
+    let (at_rover, _) = linked(&folder, IDS);
     let rover_key = Key::load(&folder.path().join("rover")).unwrap();
     let stranger = key(&folder, "stranger");
     let peers = [at_rover.local().unwrap()];
@@ -224,7 +218,7 @@ async fn the_counters_of_a_link_are_in_the_reports_of_its_node() {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
     };
-    let description = tokio::time::timeout(LIMIT, counted).await.unwrap();
+    let description = within(counted).await;
     assert_eq!(description, "handshakes refused: untrusted key");
     rover.shutdown().await;
 }

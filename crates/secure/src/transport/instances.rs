@@ -95,11 +95,12 @@ impl UsedIds {
     }
 }
 
-/// Whether a frame does nothing but set an emergency, which everybody may.
+/// Whether a frame does nothing but stop something. To release control is to take it from the program that
+/// uses the id.
 pub(super) fn only_stops(frame: &Frame, table: &Table) -> bool {
     let is_whole = frame.flags.data() == DataControl::Single && !frame.is_acknowledgement();
-    let mut needs = table.needs(&frame.payload).peekable();
-    is_whole && needs.peek().is_some() && needs.all(|it| it == Permission::Emergency)
+    let mut needs = table.needs(&frame.payload);
+    is_whole && table.stops(&frame.payload) && needs.all(|it| it != Permission::Release)
 }
 
 impl Transport {

@@ -243,17 +243,10 @@ impl Transport {
         self.remind(now);
         self.ping_owners(now);
         self.dial(now);
-        let due: Vec<_> = self
-            .sessions
-            .iter_mut()
-            .filter_map(|(&id, it)| {
-                it.connection
-                    .poll_timeout()
-                    .filter(|&at| at <= now)
-                    .map(|_| id)
-            })
-            .collect();
-        for id in due {
+        let is_due = |it: &mut Session| it.connection.poll_timeout().is_some_and(|at| at <= now);
+        let sessions = self.sessions.iter_mut();
+        let due = sessions.filter_map(|(&id, it)| is_due(it).then_some(id));
+        for id in due.collect::<Vec<_>>() {
             if let Some(session) = self.sessions.get_mut(&id) {
                 session.connection.handle_timeout(now);
             }
