@@ -408,6 +408,8 @@ mod tests {
         let obstacle = folder.path().join("audit.jsonl.1");
         let journald = folder.path().join("socket");
         let copies = std::os::unix::net::UnixDatagram::bind(&journald).unwrap();
+        let patience = Some(Duration::from_secs(20));
+        copies.set_read_timeout(patience).unwrap();
         let settings = AuditSettings {
             limits: Limits { file: 10, kept: 1 },
             ..AuditSettings::default()

@@ -162,6 +162,9 @@ struct Table {
     key: Option<PathBuf>,
     /// The file of the keys that this node trusts. Flag: `--trusted-keys`.
     trusted_keys: Option<PathBuf>,
+    /// The people of whom two must have signed each line of the trusted keys; by default `approvers` beside
+    /// those, if it is there. Flag: `--approvers`.
+    approvers: Option<PathBuf>,
     /// The file of this node's certificate, with which it accepts peers by theirs instead of by
     /// trusted keys. Flag: `--certificate`.
     certificate: Option<PathBuf>,
@@ -240,6 +243,7 @@ impl SecureFlags {
             files: KeyFiles {
                 key: self.files.key.clone().or(table.key),
                 trusted_keys: self.files.trusted_keys.clone().or(table.trusted_keys),
+                approvers: self.files.approvers.clone().or(table.approvers),
             },
             certificates: {
                 let flags = self.certificates.clone();
@@ -281,6 +285,9 @@ impl Secure {
     /// If their file cannot be used.
     pub fn trust(&self) -> Result<TrustFile, Failure> {
         let path = self.files.trusted_keys()?;
+        if let Some(approvers) = self.files.approvers()? {
+            return TrustFile::load_controlled(&path, &approvers).map_err(Failure::of);
+        }
         if self.uses_certificates() {
             return TrustFile::load_optional(&path).map_err(Failure::of);
         }
@@ -355,7 +362,13 @@ impl Secure {
         let table = table_with(&self.jsidl)?;
         // Before the file is written.
         known_names(&TrustFile::of(Trust::new(self.trust.clone())), &table)?;
-        trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
+        if self.files.approvers()?.is_none() {
+            trust_at_first_start(&self.files.trusted_keys()?, &self.trust)?;
+        } else if !self.trust.is_empty() {
+            return Err(Failure::new(
+                "--trust adds keys alone, and here two people must approve them: use `jaus keys trust`",
+            ));
+        }
         let credentials = self.credentials()?;
         let any = || match self.peers.first() {
             Some(Address(SocketAddr::V6(_))) => SocketAddr::from(([0; 16], 0)),

@@ -74,6 +74,12 @@ pub enum Rejection {
         /// Its serial number.
         serial: String,
     },
+    /// The certificate lacks the signatures of two approvers.
+    #[error(
+        "the certificate of `{0}` is not approved by two people of this node's file of approvers: issue it by \
+         `jaus keys ca issue --sign` and `jaus keys ca approve`"
+    )]
+    Unapproved(String),
     /// The revocation list cannot be used for the certificate.
     #[error(
         "the revocation list says nothing about the certificate of `{0}`: it has to be the list \

@@ -26,9 +26,10 @@ use rustls::pki_types::CertificateDer;
 use time::OffsetDateTime;
 use x509_cert::der::Decode as _;
 
+use crate::approval::{Proposal, since_1970};
 use crate::certificate::{
-    Certificate, CertificateError, Defect, MOST_IDS, SCHEME, in_file, is_name, malformed,
-    read_certificate,
+    APPROVAL, Certificate, CertificateError, Defect, MOST_IDS, SCHEME, hex, in_file, is_name,
+    malformed, read_certificate,
 };
 use crate::key::{Key, KeyError, Passphrase, PublicKey, pem, random};
 pub use register::Issued;
@@ -68,6 +69,9 @@ pub enum AuthorityError {
     /// The certificate would have no ids, or too many.
     #[error("a certificate has 1 to 32 ids, not {0}")]
     Ids(usize),
+    /// A proposal is for no certificate, or for one whose time is over.
+    #[error("the proposal is for no certificate, or the time of that is over")]
+    Proposal,
     /// The certificate would live too long.
     #[error("a certificate is valid for 1 s to 3650 days")]
     Life,
@@ -94,6 +98,42 @@ pub struct Request {
     pub ids: Vec<JausId>,
     /// How long the certificate is valid.
     pub life: Duration,
+}
+
+impl Request {
+    /// What people approve, if the certificate is to be issued: all that it will contain, with a new serial
+    /// number, so that it is one certificate.
+    ///
+    /// # Errors
+    /// If a field is out of range, or without random numbers.
+    pub fn line(&self, now: SystemTime) -> Result<String, AuthorityError> {
+        check(self)?;
+        let ids: Vec<_> = self.ids.iter().map(JausId::to_string).collect();
+        let (serial, name, key, ids) = (hex(&serial()?), &self.name, self.key, ids.join(","));
+        let not_after = since_1970(now + self.life);
+        Ok(format!("issue {serial} {name} {key} {ids} {not_after}"))
+    }
+
+    /// The request of an approved line, and its serial number.
+    fn of_line(line: &str, now: SystemTime) -> Option<(Self, Vec<u8>)> {
+        let words: Vec<_> = line.split(' ').collect();
+        let ["issue", serial, name, key, ids, not_after] = words[..] else {
+            return None;
+        };
+        let ids = ids.split(',').map(str::parse).collect::<Result<_, _>>();
+        // To the second, so that the certificate ends when it was approved to.
+        let left = not_after
+            .parse::<u64>()
+            .ok()?
+            .checked_sub(since_1970(now))?;
+        let request = Self {
+            name: name.to_owned(),
+            key: key.parse().ok()?,
+            ids: ids.ok()?,
+            life: Duration::from_secs(left),
+        };
+        Some((request, register::octets(serial)?))
+    }
 }
 
 /// A certificate authority.
@@ -124,7 +164,7 @@ impl CertificateAuthority {
             name: name.to_owned(),
         };
         let mut params = authority.params();
-        params.serial_number = Some(serial()?);
+        params.serial_number = Some(SerialNumber::from_slice(&serial()?));
         params.not_before = time(now - SLACK);
         params.not_after = time(now + LIFE);
         let certificate = params.self_signed(&authority.key)?;
@@ -161,11 +201,41 @@ impl CertificateAuthority {
     /// # Errors
     /// If a field of the request is out of range, or the register cannot be written.
     pub fn issue(&self, request: &Request, now: SystemTime) -> Result<String, AuthorityError> {
+        self.sign(request, now, (&serial()?, None))
+    }
+
+    /// Issues and registers the certificate of an approved proposal, with the signatures of those who have
+    /// approved it. Returns it as PEM.
+    ///
+    /// # Errors
+    /// As [`issue`](Self::issue); if the proposal is for no certificate.
+    pub fn issue_approved(
+        &self,
+        proposal: &Proposal,
+        now: SystemTime,
+    ) -> Result<String, AuthorityError> {
+        let request = Request::of_line(proposal.line(), now);
+        let (request, serial) = request.ok_or(AuthorityError::Proposal)?;
+        self.sign(&request, now, (&serial, Some(proposal)))
+    }
+
+    fn sign(
+        &self,
+        request: &Request,
+        now: SystemTime,
+        (serial, approval): (&[u8], Option<&Proposal>),
+    ) -> Result<String, AuthorityError> {
         check(request)?;
         let mut params = CertificateParams::default();
         params.distinguished_name = named(&request.name);
         params.subject_alt_names = names(&request.ids)?;
-        params.serial_number = Some(serial()?);
+        if let Some(approval) = approval {
+            let seal = format!("{APPROVAL}{}", approval.seal());
+            params
+                .subject_alt_names
+                .push(SanType::URI(seal.try_into()?));
+        }
+        params.serial_number = Some(SerialNumber::from_slice(serial));
         params.not_before = time(now - SLACK);
         params.not_after = time(now + request.life);
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
@@ -309,11 +379,11 @@ fn common_name(der: &CertificateDer<'_>) -> Option<String> {
 }
 
 /// A random serial number.
-fn serial() -> Result<SerialNumber, KeyError> {
+fn serial() -> Result<[u8; SERIAL], KeyError> {
     let mut octets = random::<SERIAL>()?;
     // Positive, and of a fixed length.
     octets[0] = octets[0] & 0x7F | 0x40;
-    Ok(SerialNumber::from_slice(&octets))
+    Ok(octets)
 }
 
 /// The entry of the revocation list for a certificate, if it is revoked.

@@ -12,6 +12,8 @@ use x509_cert::der::{DateTime, Decode as _};
 
 use crate::key::{KeyError, PublicKey};
 
+/// How the URI with the signatures of those who have approved a certificate begins.
+pub(crate) const APPROVAL: &str = "jaus-approval:";
 /// The scheme of the subject alternative names that hold ids: `jaus:101.255.255`.
 pub(crate) const SCHEME: &str = "jaus:";
 /// The most ids in a certificate.
@@ -103,6 +105,8 @@ pub struct Certificate {
     serial: String,
     not_before: UnixTime,
     not_after: UnixTime,
+    /// The signatures of those who have approved it.
+    approval: Option<String>,
 }
 
 impl Certificate {
@@ -128,6 +132,10 @@ impl Certificate {
             serial: hex(names.serial()),
             not_before: seconds(fields.validity().not_before),
             not_after: seconds(fields.validity().not_after),
+            approval: names
+                .valid_uri_names()
+                .find_map(|it| it.strip_prefix(APPROVAL))
+                .map(str::to_owned),
         })
     }
 
@@ -183,6 +191,20 @@ impl Certificate {
     #[must_use]
     pub const fn not_after(&self) -> UnixTime {
         self.not_after
+    }
+
+    pub(crate) fn approval(&self) -> Option<&str> {
+        self.approval.as_deref()
+    }
+
+    /// All that it allows, which is what people approve.
+    pub(crate) fn line(&self) -> String {
+        let ids: Vec<_> = self.ids.iter().map(JausId::to_string).collect();
+        let (serial, name, key, ids) = (&self.serial, &self.name, self.key, ids.join(","));
+        format!(
+            "issue {serial} {name} {key} {ids} {}",
+            self.not_after.as_secs()
+        )
     }
 
     /// Whether less than a third of its life is left.

@@ -236,8 +236,9 @@ impl Credentials {
             return Ok(Identified { peer, valid_until });
         };
         let certificate = authority.get().verify(shown, self.now())?;
+        let peer = self.trust.certified(&certificate);
         Ok(Identified {
-            peer: self.trust.certified(&certificate),
+            peer: peer.ok_or_else(|| Rejection::Unapproved(certificate.name().to_owned()))?,
             valid_until: Some(certificate.not_after()),
         })
     }

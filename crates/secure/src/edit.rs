@@ -1,13 +1,12 @@
 //! Changes of a trust file: a peer is added or removed, and the rest of the file stays as it is.
 
+use std::fmt::Display;
 use std::path::Path;
 
-use jaus_files::{Readers, edit};
+use jaus_files::{Readers, edit, read_text};
 
 use crate::key::PublicKey;
-use crate::trust::{
-    CERTIFICATE, Grant, LONGEST, Peer, Trust, TrustError, in_file, line_of, line_of_grant,
-};
+use crate::trust::{CERTIFICATE, Grant, LONGEST, Peer, Trust, TrustError, in_file};
 use jaus::rights::Rules;
 
 /// Adds a peer to a trust file, which is created if necessary. A name that has a key already gets
@@ -21,7 +20,7 @@ pub fn trust(path: &Path, peer: &Peer, also: bool) -> Result<(), TrustError> {
         if !also && known.peers().iter().any(|it| it.name == peer.name) {
             return Err(TrustError::Known(peer.name.clone()));
         }
-        Ok(Some(with_line(text, &line_of(peer))))
+        Ok(Some(with_line(text, peer)))
     })?;
     Ok(())
 }
@@ -32,18 +31,34 @@ pub fn trust(path: &Path, peer: &Peer, also: bool) -> Result<(), TrustError> {
 /// If the file cannot be read or written, has a malformed line, or has a line for the certificate
 /// already.
 pub fn grant(path: &Path, grant: &Grant) -> Result<(), TrustError> {
+    change(path, |text| Ok(Some(with_line(text, grant))))?;
+    Ok(())
+}
+
+/// Adds an approved line to a trust file, in place of the line for the same key or certificate.
+///
+/// # Errors
+/// If the file cannot be read or written, or has a malformed line.
+pub fn put(path: &Path, line: &str) -> Result<(), TrustError> {
+    let subject = |line: &str| {
+        let mut words = line.split_whitespace().map(str::to_owned);
+        let (name, proof) = (words.next(), words.next());
+        (name.filter(|_| is_grant(line)), proof)
+    };
     change(path, |text| {
-        Ok(Some(with_line(text, &line_of_grant(grant))))
+        let others = text.lines().filter(|it| subject(it) != subject(line));
+        let others: String = others.flat_map(|line| [line, "\n"]).collect();
+        Ok(Some(with_line(&others, line)))
     })?;
     Ok(())
 }
 
-fn with_line(text: &str, line: &str) -> String {
+fn with_line(text: &str, line: impl Display) -> String {
     let end = match text.is_empty() || text.ends_with('\n') {
         true => "",
         false => "\n",
     };
-    [text, end, line].concat()
+    format!("{text}{end}{line}\n")
 }
 
 /// Replaces the rules of the peer or certificate with this name; returns whether it was there. A
@@ -69,23 +84,30 @@ pub fn allow(path: &Path, name: &str, rules: &Rules) -> Result<bool, TrustError>
     })
 }
 
+/// The lines of a trust file for the peer or certificate with this name, with these rules.
+///
+/// # Errors
+/// If the file cannot be read, or has a malformed line.
+pub fn allowed(path: &Path, name: &str, rules: &Rules) -> Result<Vec<String>, TrustError> {
+    let text = read_text(path, Readers::Everyone, LONGEST).map_err(|it| in_file(path, it))?;
+    let lines = text.lines().filter(|line| is_of(name, line));
+    let lines = lines.map(|line| Ok(with_rules(line, rules)?.trim_end().to_owned()));
+    lines.collect()
+}
+
 /// A line of a trust file with other rules.
 fn with_rules(line: &str, rules: &Rules) -> Result<String, TrustError> {
     let trust = Trust::parse(line)?;
     let rules = rules.clone();
     let peers = trust.peers().iter().cloned();
     let peers = peers.map(|it| {
-        line_of(&Peer {
-            rules: rules.clone(),
-            ..it
-        })
+        let rules = rules.clone();
+        format!("{}\n", Peer { rules, ..it })
     });
     let grants = trust.grants().iter().cloned();
     let grants = grants.map(|it| {
-        line_of_grant(&Grant {
-            rules: rules.clone(),
-            ..it
-        })
+        let rules = rules.clone();
+        format!("{}\n", Grant { rules, ..it })
     });
     Ok(peers.chain(grants).collect())
 }

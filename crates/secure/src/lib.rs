@@ -36,6 +36,7 @@
 //! The protocol logic ([`transport`]) does no I/O and reads no clock; [`SecureLink`] adds the socket.
 #![forbid(unsafe_code)]
 
+mod approval;
 mod authority;
 pub mod beacon;
 #[cfg(feature = "ca")]
@@ -51,6 +52,7 @@ mod tls;
 pub mod transport;
 mod trust;
 
+pub use approval::{ApprovalError, DualControl, Proposal};
 pub use authority::{Authority, Rejection};
 pub use certificate::{Certificate, CertificateError, Defect};
 pub use credentials::{CertificateFiles, Credentials, CredentialsError};

@@ -14,18 +14,22 @@
 //! no line for a peer; a line with the word `certificate` in place of the key narrows the ids of the
 //! certificate with that name, and grants it rules.
 
+mod file;
+
+use std::fmt;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
-use std::sync::Arc;
 
 use jaus::address::JausId;
-use jaus_files::{Followed, Readers};
 
+use crate::approval::{ApprovalError, Approvers};
 use crate::certificate::Certificate;
-use crate::follow::{REFUSING, follow};
 use crate::key::{KeyError, PublicKey};
 use jaus::rights::{RuleError, Rules, Table};
+
+pub use file::TrustFile;
+pub(crate) use file::in_file;
 
 /// What stands in place of the key in a line for a certificate.
 pub(crate) const CERTIFICATE: &str = "certificate";
@@ -94,6 +98,9 @@ pub enum TrustError {
          `jaus keys revoke`"
     )]
     Known(String),
+    /// The dual control of the file refuses something.
+    #[error(transparent)]
+    Approval(#[from] ApprovalError),
     /// A key appears twice, or a name in lines for certificates.
     #[error("line {line}: `{name}` or its key is already in line {first}: remove one of them")]
     Twice {
@@ -158,14 +165,19 @@ pub struct Grant {
 pub struct Trust {
     peers: Vec<Peer>,
     grants: Vec<Grant>,
+    /// Who has approved its lines, under dual control.
+    pub(crate) approvers: Option<Approvers>,
 }
 
 impl Trust {
     /// Trusts these peers.
     #[must_use]
     pub const fn new(peers: Vec<Peer>) -> Self {
-        let grants = Vec::new();
-        Self { peers, grants }
+        Self {
+            peers,
+            grants: Vec::new(),
+            approvers: None,
+        }
     }
 
     /// Reads the text of a trust file.
@@ -227,6 +239,13 @@ impl Trust {
             ids: grant.map_or_else(|| ids.to_vec(), |it| common(ids, &it.ids)),
             rules: grant.map_or_else(Rules::default, |it| it.rules.clone()),
         }
+    }
+
+    /// The name and the text of each line.
+    pub(crate) fn lines(&self) -> impl Iterator<Item = (&str, String)> {
+        let peers = self.peers.iter().map(|it| (&*it.name, it.to_string()));
+        let grants = self.grants.iter().map(|it| (&*it.name, it.to_string()));
+        peers.chain(grants)
     }
 
     /// The peers that are trusted by their keys, in the order of the file.
@@ -307,160 +326,33 @@ fn parse_line(line: usize, text: &str) -> Result<Line, TrustError> {
     })
 }
 
-/// The line of a peer in a trust file.
-pub(crate) fn line_of(peer: &Peer) -> String {
-    line(&peer.name, &peer.key.to_string(), &peer.ids, &peer.rules)
+/// Its line in a trust file.
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&line(
+            &self.name,
+            &self.key.to_string(),
+            &self.ids,
+            &self.rules,
+        ))
+    }
 }
 
-/// The line of a certificate in a trust file.
-pub(crate) fn line_of_grant(grant: &Grant) -> String {
-    line(&grant.name, CERTIFICATE, &grant.ids, &grant.rules)
+/// Its line in a trust file.
+impl fmt::Display for Grant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&line(&self.name, CERTIFICATE, &self.ids, &self.rules))
+    }
 }
 
 fn line(name: &str, key: &str, ids: &[JausId], rules: &Rules) -> String {
     let ids: Vec<_> = ids.iter().map(JausId::to_string).collect();
     let line = format!("{name} {key} {} {rules}", ids.join(","));
-    format!("{}\n", line.trim_end())
-}
-
-/// The trust of a running node, shared by its link and its handshakes. Replacing it takes effect at
-/// once: the link closes the sessions of keys that are no longer trusted.
-#[derive(Clone, Debug)]
-pub struct TrustFile(Followed<Trust, TrustError>);
-
-impl Default for TrustFile {
-    fn default() -> Self {
-        Self::of(Trust::default())
-    }
-}
-
-impl TrustFile {
-    /// Shares a trust that is not in a file.
-    #[must_use]
-    pub fn of(trust: Trust) -> Self {
-        Self(Followed::of(trust))
-    }
-
-    /// Reads a trust file.
-    ///
-    /// # Errors
-    /// If it cannot be read, or a line is malformed.
-    pub fn load(path: &Path) -> Result<Self, TrustError> {
-        let owned = path.to_owned();
-        Followed::load(vec![path.to_owned()], move || read(&owned)).map(Self)
-    }
-
-    /// Reads a trust file, which may be missing as long as there is nothing to say.
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
-    pub fn load_optional(path: &Path) -> Result<Self, TrustError> {
-        let owned = path.to_owned();
-        let read = move || match read(&owned) {
-            Err(TrustError::File { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
-                Ok(Trust::default())
-            }
-            other => other,
-        };
-        Followed::load(vec![path.to_owned()], read).map(Self)
-    }
-
-    /// Reads the file again. On an error the previous trust stays, and new sessions are refused until
-    /// the file can be read again.
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
-    pub fn reload(&self) -> Result<(), TrustError> {
-        self.0.reload()
-    }
-
-    /// Reads the file again whenever it has changed, as long as the trust is in use. Must be called
-    /// within a tokio runtime. A file that has become unusable is logged, and has the effect of
-    /// [`reload`](Self::reload) with an error.
-    pub fn follow(&self) {
-        follow(&self.0, REFUSING);
-    }
-
-    /// Why new sessions are refused: the file has become unusable.
-    pub(crate) fn fault(&self) -> Option<Arc<str>> {
-        self.0.fault()
-    }
-
-    /// Replaces the trust.
-    pub fn replace(&self, trust: Trust) {
-        self.0.replace(trust);
-    }
-
-    /// The peer with this key.
-    #[must_use]
-    pub fn find(&self, key: PublicKey) -> Option<Peer> {
-        self.0.get().find(key).cloned()
-    }
-
-    /// The peer with this certificate, which has been verified.
-    pub(crate) fn certified(&self, certificate: &Certificate) -> Peer {
-        self.0.get().certified(certificate)
-    }
-
-    /// Checks the names in its rules: see [`Trust::verify`].
-    ///
-    /// # Errors
-    /// As [`Trust::verify`].
-    pub fn verify(&self, table: &Table) -> Result<(), (String, RuleError)> {
-        self.0.get().verify(table)
-    }
-
-    /// The number of trusted keys.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.0.get().peers().len()
-    }
-
-    /// Whether no key is trusted.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// All trusted keys.
-    pub(crate) fn keys(&self) -> Vec<PublicKey> {
-        let trust = self.0.get();
-        trust.peers().iter().map(|peer| peer.key).collect()
-    }
-
-    /// The ids of all trusted keys.
-    pub(crate) fn ids(&self) -> Vec<JausId> {
-        let trust = self.0.get();
-        let ids = trust.peers().iter().flat_map(|peer| &peer.ids);
-        ids.copied().collect()
-    }
-
-    /// How often the trust was replaced.
-    pub(crate) fn edition(&self) -> u64 {
-        self.0.edition()
-    }
-}
-
-fn read(path: &Path) -> Result<Trust, TrustError> {
-    let text = jaus_files::read_text(path, Readers::Everyone, LONGEST);
-    let text = text.map_err(|source| in_file(path, source))?;
-    Trust::parse(&text).map_err(|source| TrustError::Malformed {
-        path: path.to_owned(),
-        source: Box::new(source),
-    })
-}
-
-pub(crate) fn in_file(path: &Path, source: io::Error) -> TrustError {
-    TrustError::File {
-        path: path.to_owned(),
-        source,
-    }
+    line.trim_end().to_owned()
 }
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
 
     fn key(octet: u8) -> PublicKey {
@@ -515,62 +407,6 @@ mod tests {
         ] {
             let error = Trust::parse(&text).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
-        }
-    }
-
-    #[test]
-    fn a_reload_with_an_error_leaves_the_trust_of_sessions_and_refuses_new_ones() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trusted_keys");
-        fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
-        let file = TrustFile::load(&path).unwrap();
-        fs::write(&path, "rover\n").unwrap();
-        assert_eq!(file.fault(), None);
-        assert!(file.reload().is_err());
-        assert!(file.find(key(1)).is_some());
-        let fault = file.fault().unwrap();
-        let named = format!("the trust file {}, line 1: ", path.display());
-        assert!(fault.starts_with(&named), "{fault}");
-        fs::write(&path, "").unwrap();
-        file.reload().unwrap();
-        assert!(file.find(key(1)).is_none());
-        assert_eq!(file.fault(), None);
-    }
-
-    #[cfg(unix)]
-    #[tokio::test]
-    async fn a_revocation_is_confirmed_when_the_node_that_follows_the_file_has_taken_it() {
-        use jaus_files::{FormerContent, Uptake};
-
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trusted_keys");
-        fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
-        let file = TrustFile::load(&path).unwrap();
-        file.follow();
-        let former = FormerContent::of(&path);
-        assert!(crate::edit::revoke(&path, "rover", None).unwrap());
-        let waiting = tokio::task::spawn_blocking(move || former.uptake());
-        let uptake = waiting.await.unwrap();
-        assert!(matches!(uptake, Uptake::Complete), "{uptake:?}");
-        assert!(file.find(key(1)).is_none());
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_file_that_others_can_change_is_refused_with_the_remedy() {
-        use std::os::unix::fs::PermissionsExt as _;
-
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trusted_keys");
-        fs::write(&path, format!("rover {} 101.255.255\n", key(1))).unwrap();
-        for (mode, is_refused) in [(0o666, true), (0o664, true), (0o644, false), (0o600, false)] {
-            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
-            let loaded = TrustFile::load(&path);
-            assert_eq!(loaded.is_err(), is_refused, "{mode:o}");
-            if let Err(error) = loaded {
-                let error = error.to_string();
-                assert!(error.contains("chmod go-w /"), "{error}");
-            }
         }
     }
 }

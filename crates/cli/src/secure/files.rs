@@ -71,6 +71,11 @@ pub struct KeyFiles {
     /// The file of the keys that this node trusts [default: trusted_keys beside the key]
     #[arg(long, value_name = "FILE")]
     pub(super) trusted_keys: Option<PathBuf>,
+
+    /// Accept a line of the trusted keys only if two of the people in this file have signed it: a name and
+    /// a public key in each line [default: approvers beside the trusted keys, if it is there]
+    #[arg(long, value_name = "FILE")]
+    pub(super) approvers: Option<PathBuf>,
 }
 
 impl KeyFiles {
@@ -108,6 +113,16 @@ impl KeyFiles {
             return Ok(Self::folder()?.join("trusted_keys"));
         }
         Ok(key.with_file_name("trusted_keys"))
+    }
+
+    /// The file of those who approve changes of the trusted keys, if these are under dual control.
+    ///
+    /// # Errors
+    /// As [`key`](Self::key).
+    pub fn approvers(&self) -> Result<Option<PathBuf>, Failure> {
+        let beside = self.trusted_keys()?.with_file_name("approvers");
+        let beside = beside.exists().then_some(beside);
+        Ok(self.approvers.clone().or(beside))
     }
 }
 

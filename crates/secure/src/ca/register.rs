@@ -9,6 +9,7 @@ use jaus::address::JausId;
 use rustls::pki_types::UnixTime;
 
 use super::AuthorityError;
+use crate::approval::since_1970;
 use crate::certificate::{self, Certificate, CertificateError};
 use crate::key::PublicKey;
 
@@ -55,10 +56,7 @@ impl Issued {
 
     /// The octets of the serial number; `None` if the line of the register was damaged.
     pub(super) fn serial_octets(&self) -> Option<Vec<u8>> {
-        let pairs = self.serial.as_bytes().chunks(2);
-        pairs
-            .map(|it| u8::from_str_radix(std::str::from_utf8(it).ok()?, 16).ok())
-            .collect()
+        octets(&self.serial)
     }
 
     fn parse(line: &str) -> Result<Self, String> {
@@ -120,9 +118,12 @@ pub(super) fn read(path: &Path) -> Result<Vec<Issued>, AuthorityError> {
         .collect()
 }
 
-fn since_1970(time: SystemTime) -> u64 {
-    time.duration_since(SystemTime::UNIX_EPOCH)
-        .map_or(0, |it| it.as_secs())
+/// The octets of hexadecimal digits.
+pub(super) fn octets(text: &str) -> Option<Vec<u8>> {
+    let pairs = text.as_bytes().chunks(2);
+    pairs
+        .map(|it| u8::from_str_radix(std::str::from_utf8(it).ok()?, 16).ok())
+        .collect()
 }
 
 fn seconds(text: &str) -> Result<SystemTime, String> {

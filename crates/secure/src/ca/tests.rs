@@ -7,7 +7,10 @@ use tempfile::TempDir;
 use std::fs;
 
 use super::*;
+use crate::approval::DualControl;
 use crate::authority::{Authority, Rejection};
+use crate::credentials::{CertificateFiles, Credentials};
+use crate::trust::TrustFile;
 
 const NOW: u64 = 1_800_000_000;
 const DAY: u64 = 24 * 60 * 60;
@@ -198,4 +201,64 @@ fn an_authority_is_not_replaced_and_a_damaged_register_is_named() {
     fs::write(&path, format!("{text}{}", &text[..40])).unwrap();
     let error = authority.revoke("rover", at(NOW)).unwrap_err().to_string();
     assert!(error.contains("line 2 of"), "{error}");
+}
+
+#[test]
+fn a_node_under_dual_control_accepts_no_certificate_that_one_person_has_issued() {
+    let (folder, authority) = authority();
+    let path = |name: &str| folder.path().join(name);
+    let [anna, ben] = ["anna", "ben"].map(|name| Key::create(&path(name)).unwrap());
+    let approvers = format!("anna {}\nben {}\n", anna.public(), ben.public());
+    fs::write(path("approvers"), approvers).unwrap();
+    fs::write(path("trusted_keys"), "").unwrap();
+    let own = Key::create(&path("node")).unwrap();
+    let request = |ids: &str| Request {
+        key: own.public(),
+        ..request("rover", &[ids])
+    };
+    let control = DualControl::new(&path("issued"), &path("approvers"));
+    let approved = |ids: &str| {
+        let line = request(ids).line(at(NOW)).unwrap();
+        let proposal = control.propose(&line, &anna, at(NOW)).unwrap();
+        control.approve(&proposal.id(), &ben, at(NOW)).unwrap()
+    };
+    let approval = approved("101.255.255");
+    // Hours later: it ends when it was approved to.
+    let later = at(NOW + 5 * 60 * 60) + Duration::from_millis(700);
+    let good = authority.issue_approved(&approval, later).unwrap();
+    fs::write(path("node.crt"), &good).unwrap();
+
+    let files = CertificateFiles {
+        certificate: path("node.crt"),
+        authority: path("ca.crt"),
+        revoked: None,
+    };
+    let trust = TrustFile::load_controlled(&path("trusted_keys"), &path("approvers")).unwrap();
+    let node = Credentials::load_certified(&path("node"), &files, trust, later).unwrap();
+    let admit = |pem: &str| {
+        let der = CertificateDer::from_pem_slice(pem.as_bytes()).unwrap();
+        node.admit(&der).map(|it| it.peer.name)
+    };
+    assert_eq!(admit(&good).unwrap(), "rover");
+    // The key of the authority alone issues nothing, with the signatures of another certificate neither,
+    // nor the same one with another serial number, which a revocation would not reach.
+    let alone = authority.issue(&request("101.255.255"), later).unwrap();
+    let (same, number) = Request::of_line(approval.line(), later).unwrap();
+    let signed = |request: &Request, number: &[u8]| {
+        authority
+            .sign(request, later, (number, Some(&approval)))
+            .unwrap()
+    };
+    assert!(admit(&signed(&same, &number)).is_ok());
+    let again = signed(&same, &serial().unwrap());
+    let stolen = signed(&request("255.255.255"), &number);
+    for pem in [alone, stolen, again] {
+        let refused = admit(&pem).unwrap_err();
+        assert!(matches!(refused, Rejection::Unapproved(_)), "{refused}");
+    }
+    // A proposal that is for a line of a trust file is none for a certificate.
+    let line = format!("rover {} 101.255.255", own.public());
+    let proposal = control.propose(&line, &anna, at(NOW)).unwrap();
+    let refused = authority.issue_approved(&proposal, later).unwrap_err();
+    assert!(matches!(refused, AuthorityError::Proposal), "{refused}");
 }

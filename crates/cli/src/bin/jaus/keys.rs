@@ -1,5 +1,6 @@
 //! `jaus keys`: the key of this host's node, the keys that it trusts, and the team's certificates.
 
+mod approve;
 mod ca;
 mod explain;
 mod rotate;
@@ -61,6 +62,8 @@ enum Action {
     Allow(Allow),
     /// No longer trust a peer; its links to running nodes end
     Revoke(Revoke),
+    /// Approve a proposed change of the trusted keys, or list those that wait
+    Approve(approve::Approve),
     /// List the trusted keys, the ids that they may speak for, and their rules
     List(List),
     /// Show which messages a peer may send, and why not the others
@@ -96,6 +99,9 @@ struct TrustKey {
     also: bool,
 
     #[command(flatten)]
+    signer: approve::Signer,
+
+    #[command(flatten)]
     files: KeyFiles,
 }
 
@@ -124,6 +130,9 @@ struct Allow {
 
     #[command(flatten)]
     rules: RuleWords,
+
+    #[command(flatten)]
+    signer: approve::Signer,
 
     #[command(flatten)]
     files: KeyFiles,
@@ -195,6 +204,7 @@ impl Keys {
             Action::Trust(it) => it.add(),
             Action::Allow(it) => it.replace(),
             Action::Revoke(it) => it.remove(),
+            Action::Approve(it) => it.run(),
             Action::List(it) => it.list(),
             Action::Rotate(it) => it.run(),
             Action::Explain(it) => it.run(),
@@ -232,19 +242,27 @@ impl TrustKey {
         make_folder_of(&path)?;
         let (name, ids) = (self.name.clone(), self.ids.0.clone());
         let rules = self.rules.rules()?;
-        let done = || match self.proof {
+        let (peer, grant);
+        let (line, done): (String, Box<dyn Fn() -> _>) = match self.proof {
             Proof::Key(key) => {
-                let peer = Peer {
+                peer = Peer {
                     name,
                     key,
                     ids,
                     rules,
                 };
-                edit::trust(&path, &peer, self.also)
+                let add = || edit::trust(&path, &peer, self.also);
+                (peer.to_string(), Box::new(add))
             }
-            Proof::Certificate => edit::grant(&path, &Grant { name, ids, rules }),
+            Proof::Certificate => {
+                grant = Grant { name, ids, rules };
+                (grant.to_string(), Box::new(|| edit::grant(&path, &grant)))
+            }
         };
-        with_uptake(&path, || done().map_err(Failure::of))
+        match approve::control(&self.files)? {
+            Some(control) => self.signer.propose(&control, approve::COMMAND, &[line]),
+            None => with_uptake(&path, || done().map_err(Failure::of)),
+        }
     }
 }
 
@@ -252,6 +270,11 @@ impl Allow {
     fn replace(&self) -> Result<Outcome, Failure> {
         let path = self.files.trusted_keys()?;
         let rules = self.rules.rules()?;
+        if let Some(control) = approve::control(&self.files)? {
+            let lines = edit::allowed(&path, &self.name, &rules).map_err(Failure::of)?;
+            check_there(!lines.is_empty(), &self.name, &path)?;
+            return self.signer.propose(&control, approve::COMMAND, &lines);
+        }
         with_uptake(&path, || {
             let is_there = edit::allow(&path, &self.name, &rules).map_err(Failure::of)?;
             check_there(is_there, &self.name, &path)
@@ -264,7 +287,9 @@ impl Revoke {
         let path = self.files.trusted_keys()?;
         with_uptake(&path, || {
             let was_there = edit::revoke(&path, &self.name, self.public_key);
-            check_there(was_there.map_err(Failure::of)?, &self.name, &path)
+            check_there(was_there.map_err(Failure::of)?, &self.name, &path)?;
+            approve::forget_removed(&self.files);
+            Ok(())
         })
     }
 }

@@ -1,5 +1,6 @@
 //! `jaus keys`, and commands that reach a vehicle by a secure link alone.
 
+mod approve;
 mod certificates;
 mod programs;
 mod rights;

@@ -17,11 +17,12 @@ use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::folders::make_folder_of;
 use jaus_cli::output::{Output, counted, say};
 use jaus_cli::secure::KeyFiles;
-use jaus_secure::PublicKey;
 use jaus_secure::ca::{CertificateAuthority, Issued, Request};
+use jaus_secure::{DualControl, PublicKey};
 use serde_json::json;
 
 use super::Ids;
+use super::approve::{Signer, list_waiting};
 use crate::uptake::with_uptake;
 use passphrase::{Change, Present, chosen};
 
@@ -51,6 +52,8 @@ enum Action {
     New(New),
     /// Issue a certificate and print it
     Issue(Issue),
+    /// Approve a proposed certificate, issue and print it; or list those that wait
+    Approve(Approve),
     /// Revoke the certificates of a node, and write the revocation list
     Revoke(Revoke),
     /// List the issued certificates
@@ -100,6 +103,30 @@ struct Issue {
     /// How long the certificate is valid: days such as 30d, or a duration such as 12h
     #[arg(long = "for", value_name = "TIME", default_value = "30d", value_parser = life)]
     life: Duration,
+
+    #[command(flatten)]
+    signer: Signer,
+
+    #[command(flatten)]
+    present: Present,
+
+    #[command(flatten)]
+    folder: Folder,
+}
+
+/// Approve a proposed certificate, issue and print it; or list those that wait
+///
+/// Where a file `approvers` stands in the folder of the authority, two of its people must sign what a
+/// certificate allows: one by --sign with `jaus keys ca issue`, another one here. Nodes with the same file
+/// beside their trusted keys accept no certificate without both. Revoking needs one alone.
+#[derive(Args)]
+struct Approve {
+    /// The proposal to approve, as it is listed without this argument
+    #[arg(requires = "sign")]
+    proposal: Option<String>,
+
+    #[command(flatten)]
+    signer: Signer,
 
     #[command(flatten)]
     present: Present,
@@ -152,6 +179,7 @@ impl Ca {
         match &self.action {
             Action::New(it) => it.make(),
             Action::Issue(it) => it.issue(),
+            Action::Approve(it) => it.run(),
             Action::Revoke(it) => it.revoke(),
             Action::List(it) => it.list(),
             Action::Passphrase(it) => it.run(),
@@ -165,6 +193,14 @@ impl Folder {
             Some(path) => Ok(path.clone()),
             None => Ok(KeyFiles::folder()?.join("ca")),
         }
+    }
+
+    /// The dual control of what it issues, if it is under that.
+    fn control(&self) -> Result<Option<DualControl>, Failure> {
+        let folder = self.path()?;
+        let approvers = folder.join("approvers");
+        let control = DualControl::new(&folder.join("issued"), &approvers);
+        Ok(approvers.exists().then_some(control))
     }
 }
 
@@ -193,9 +229,37 @@ impl Issue {
             ids: self.ids.0.clone(),
             life: self.life,
         };
+        if let Some(control) = self.folder.control()? {
+            let line = request.line(SystemTime::now()).map_err(Failure::of)?;
+            return self
+                .signer
+                .propose(&control, "jaus keys ca approve", &[line]);
+        }
         let authority = self.present.open(&self.folder)?;
         let pem = authority
             .issue(&request, SystemTime::now())
+            .map_err(Failure::of)?;
+        Output::new().part(&pem)?;
+        Ok(Outcome::Done)
+    }
+}
+
+impl Approve {
+    fn run(&self) -> Result<Outcome, Failure> {
+        let Some(control) = self.folder.control()? else {
+            return Err(Failure::new(
+                "the authority is not under dual control: write those who approve into `approvers` in its folder",
+            ));
+        };
+        let Some(id) = &self.proposal else {
+            return list_waiting(&control);
+        };
+        let (key, now) = (self.signer.key()?, SystemTime::now());
+        // Before it is signed, so that a wrong passphrase does not spend the approval.
+        let authority = self.present.open(&self.folder)?;
+        let approved = control.approve(id, &key, now).map_err(Failure::of)?;
+        let pem = authority
+            .issue_approved(&approved, now)
             .map_err(Failure::of)?;
         Output::new().part(&pem)?;
         Ok(Outcome::Done)
