@@ -309,6 +309,8 @@ fn a_component_that_changes_sides_belongs_to_its_bridge_once_it_is_silent_here()
         assert_eq!(here.counters().get(Counter::OwnId), 1);
         let silent = start + LOCAL_FOR;
         here.expire(silent);
+        // A further claim meanwhile is refused as the first one was.
+        announce_by(BridgeId::new(9), silent, &mut here, DRIVER);
         let free = silent + is_free_after;
         let before = free - Duration::from_millis(1);
         here.expire(before);

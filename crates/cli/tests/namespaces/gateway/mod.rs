@@ -8,11 +8,13 @@
 pub(crate) mod operator;
 pub(crate) mod ra_vehicle;
 
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use jaus_test_kit::hosts::{Process, TwoHosts, on_host, on_two_hosts};
 use jaus_test_kit::vehicle_process::VehicleProcess;
+use jaus_test_kit::waiting::block_until;
 
 /// A running gateway; killed when dropped.
 pub(crate) struct Gateway(Child);
@@ -159,10 +161,21 @@ fn the_vehicle_of_a_client_that_was_killed_stops_and_is_free() {
     });
 }
 
+/// Waits until an audit log has an entry with all of these texts.
+fn wait_for_entry(log: &Path, texts: &[&str]) {
+    let has_all = |line: &str| texts.iter().all(|text| line.contains(text));
+    block_until(|| {
+        let entries = std::fs::read_to_string(log).unwrap_or_default();
+        entries.lines().any(has_all)
+    });
+}
+
 #[test]
 fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
     on_two_hosts(|hosts| {
-        let _gateway = gateway(hosts, &[]);
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("audit.jsonl");
+        let _gateway = gateway(hosts, &["--audit", log.to_str().unwrap()]);
         let mut jaus = hosts.command(1, env!("CARGO_BIN_EXE_jaus"));
         let vehicle = jaus.args(["vehicle", "--id", "101.1.7", "--port", "0"]);
         let _vehicle = VehicleProcess::start(vehicle);
@@ -171,6 +184,9 @@ fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
         operator.says("101.1.38.7 latitude");
         operator.says("in control of 101.1.33.7");
         operator.says("101.1.42.7 moves");
+        for message in ["RequestControl", "ConfirmControl"] {
+            wait_for_entry(&log, &["\"who\":\"RA 20.1.32.1\"", "101.1.7", message]);
+        }
     });
 }
 
