@@ -157,8 +157,8 @@ async fn silent_connections_keep_no_component_out() {
     let place = Place::new();
     let _node = place.node();
     let path = place.path().to_owned();
-    let connect = move || (0..100).map(|_| UnixStream::connect(&path).unwrap());
-    let silent = blocking(move || connect().collect::<Vec<_>>()).await;
+    let connect = move |_| UnixStream::connect(&path).unwrap();
+    let silent = blocking(move || (0..100).map(connect).collect::<Vec<_>>()).await;
     // Sooner than the node waits for what a connection says.
     let attached = tokio::time::timeout(Duration::from_secs(3), place.host().attach(33)).await;
     attached.unwrap().unwrap();

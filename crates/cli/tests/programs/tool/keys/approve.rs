@@ -59,7 +59,11 @@ fn a_key_that_one_person_trusts_gets_in_when_another_person_approves() {
 
     // Whoever writes the file by hand alone ends new sessions, and gets nothing.
     let text = fs::read_to_string(&trusted_keys).unwrap();
-    fs::write(&trusted_keys, text.replace("255.255\n", "255.255 control=255\n")).unwrap();
+    fs::write(
+        &trusted_keys,
+        text.replace("255.255\n", "255.255 control=255\n"),
+    )
+    .unwrap();
     block_until(|| query().status != 0);
     block_until(|| at_vehicle.audit().contains("is not approved by two people"));
     fs::write(&trusted_keys, text).unwrap();
