@@ -514,6 +514,14 @@ mod tests {
             assert!(refused.contains(words), "{refused}");
             assert!(scene.load().is_err());
         }
+        // Nor do two keys of one person, written into the file of approvals.
+        let (mut twice, second) = (proposal.clone(), scene.key("anna2"));
+        let signature = second.sign(twice.message().as_bytes()).unwrap();
+        twice.signatures.push((second.public(), signature));
+        let approvals = scene.path("trusted_keys.approvals");
+        fs::write(&approvals, format!("{twice}\n")).unwrap();
+        assert!(scene.load().is_err());
+        fs::write(&approvals, format!("{proposal}\n")).unwrap();
         let waiting = scene.control.waiting(NOW).unwrap();
         assert_eq!(waiting[0], (proposal.clone(), vec!["anna".to_owned()]));
         assert_eq!(approve("ben").unwrap().line(), line);
