@@ -274,7 +274,6 @@ impl DualControl {
                     path,
                     line: index + 1,
                 }
-                .into()
             })
         });
         proposals.collect()
