@@ -28,7 +28,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use jaus_files::Readers;
 use rustls::pki_types::UnixTime;
 
-use crate::certificate::{Certificate, shown};
+use crate::certificate::{Certificate, hex, shown};
 use crate::crypto::digest::{SHA256, digest};
 use crate::key::{Key, PublicKey};
 use crate::trust::{LONGEST, Trust};
@@ -72,6 +72,9 @@ pub enum ApprovalError {
         /// The line's number, from 1.
         line: usize,
     },
+    /// Who approves a line must see all of it.
+    #[error("the line has characters that cannot be shown")]
+    Unprintable,
     /// No proposal has this id.
     #[error("no proposal `{}` waits for approval: `approve` without it lists those that do", jaus_text::visible(.0))]
     NoProposal(String),
@@ -156,6 +159,9 @@ impl DualControl {
         key: &Key,
         now: SystemTime,
     ) -> Result<Proposal, ApprovalError> {
+        if line.contains(jaus_text::is_unprintable) {
+            return Err(ApprovalError::Unprintable);
+        }
         let made = since_1970(now);
         let mut proposal = Proposal {
             line: line.to_owned(),
@@ -268,7 +274,6 @@ impl DualControl {
                     path,
                     line: index + 1,
                 }
-                .into()
             })
         });
         proposals.collect()
@@ -352,12 +357,12 @@ impl Proposal {
         shown(UnixTime::since_unix_epoch(Duration::from_secs(self.until)))
     }
 
-    /// By what it is named: the first 16 hexadecimal digits of the SHA-256 of what is signed.
+    /// By what it is named: the first 32 hexadecimal digits of the SHA-256 of what is signed, so that nobody can
+    /// make two proposals of one name.
     #[must_use]
     pub fn id(&self) -> String {
         let hash = digest(&SHA256, self.message().as_bytes());
-        let octets = hash.as_ref().iter().take(8);
-        octets.map(|it| format!("{it:02x}")).collect()
+        hex(&hash.as_ref()[..16])
     }
 
     /// What is signed.
@@ -396,6 +401,9 @@ impl FromStr for Proposal {
     type Err = ();
 
     fn from_str(text: &str) -> Result<Self, ()> {
+        if text.contains(jaus_text::is_unprintable) {
+            return Err(());
+        }
         let mut parts = text.splitn(4, ' ');
         let mut part = || parts.next().ok_or(());
         let seconds = |text: &str| text.parse().map_err(drop);
@@ -505,6 +513,14 @@ mod tests {
             assert!(refused.contains(words), "{refused}");
             assert!(scene.load().is_err());
         }
+        // Nor do two keys of one person, written into the file of approvals.
+        let (mut twice, second) = (proposal.clone(), scene.key("anna2"));
+        let signature = second.sign(twice.message().as_bytes()).unwrap();
+        twice.signatures.push((second.public(), signature));
+        let approvals = scene.path("trusted_keys.approvals");
+        fs::write(&approvals, format!("{twice}\n")).unwrap();
+        assert!(scene.load().is_err());
+        fs::write(&approvals, format!("{proposal}\n")).unwrap();
         let waiting = scene.control.waiting(NOW).unwrap();
         assert_eq!(waiting[0], (proposal.clone(), vec!["anna".to_owned()]));
         assert_eq!(approve("ben").unwrap().line(), line);
@@ -558,13 +574,16 @@ mod tests {
         let refused = approve(&proposal.id(), late).unwrap_err().to_string();
         assert!(refused.contains("propose it again"), "{refused}");
         assert_eq!(scene.control.waiting(late).unwrap(), []);
+        let hidden = line("").replace("console", "con\u{1b}[8msole");
+        let refused = scene.control.propose(&hidden, &scene.key("anna"), NOW);
+        assert!(matches!(refused, Err(ApprovalError::Unprintable)));
         let refused = approve("abc", NOW).unwrap_err().to_string();
         assert!(refused.contains("`abc`"), "{refused}");
         for (name, words) in [
             ("trusted_keys.approvals", "approvals, line 1"),
             ("approvers", "approvers, line 1"),
         ] {
-            fs::write(scene.path(name), "nonsense\n").unwrap();
+            fs::write(scene.path(name), "nonsense of nobody\n").unwrap();
             assert!(scene.refusal().contains(words), "{}", scene.refusal());
         }
         fs::remove_file(scene.path("approvers")).unwrap();
