@@ -341,14 +341,6 @@ mod tests {
             assert!(!drive.is_moving(), "{number}");
             assert_eq!(drive.poll_velocity(now + ms(1)), Some(Velocity::ZERO));
         }
-        // That of another publisher stops nothing.
-        let mut drive = driven(start);
-        let other = command(start + ms(1), OTHER, 0.0);
-        assert_eq!(
-            drive.handle_command(start + ms(1), &other),
-            Err(Refusal::OtherPublisher)
-        );
-        assert!(drive.is_moving());
     }
 
     #[test]
