@@ -66,7 +66,8 @@ async fn name_of(uid: u32) -> Option<String> {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -11,6 +11,7 @@ use super::source::{Definition, Kind, Shape, Source, Variant};
 /// The sources of the settings.
 const FILES: [&str; 20] = [
     "src/node/config/mod.rs",
+    "src/node/config/local_user.rs",
     "src/node/config/delivery.rs",
     "src/node/config/tcp.rs",
     "src/node/config/peer.rs",
