@@ -11,7 +11,7 @@ use crate::rights::{Grant, GrantError, RuleError, Rules, Table};
 const ANY: &str = "*";
 
 /// A user of the host and what its programs may do that attach to the node, as text
-/// `jaus-planner control=255`, or with the ids that they may have: `jaus-camera 101.1.40 observe`.
+/// `planner control=255`, or with the ids that they may have: `camera 101.1.40 observe`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocalUser {
     /// Its name or number; `*` means any.
@@ -26,7 +26,7 @@ pub enum LocalUserError {
     /// No user.
     #[error(
         "a user of this host is missing: write its name or number, or * for any, and then what its programs \
-         may do, such as `jaus-camera observe`"
+         may do, such as `camera observe`"
     )]
     Name,
     /// No rights; without this, a forgotten word would mean `observe`.

@@ -131,7 +131,7 @@ pub struct Config {
     /// run as users of their own. Concerns sockets of the file system.
     pub local_group: bool,
     /// What the programs of each user may do that attach there, in the words of
-    /// [`rights`](crate::rights): `["jaus-planner control=255", "jaus-camera 101.1.40 observe"]`, for any
+    /// [`rights`](crate::rights): `["planner control=255", "camera 101.1.40 observe"]`, for any
     /// user `*`. The first entry for a user counts, and a user without one may not attach. Without entries,
     /// and for root and the user of this process, there are no limits.
     pub local_users: Vec<LocalUser>,

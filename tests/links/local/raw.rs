@@ -156,7 +156,7 @@ async fn a_connection_that_begins_with_something_else_is_closed() {
 async fn silent_connections_keep_no_component_out() {
     let place = Place::new();
     let _node = place.node();
-    let path = place.path().to_owned();
+    let path = place.path();
     let connect = move |_| UnixStream::connect(&path).unwrap();
     let silent = blocking(move || (0..100).map(connect).collect::<Vec<_>>()).await;
     // Sooner than the node waits for what a connection says.

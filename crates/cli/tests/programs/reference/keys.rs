@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::source::{Definition, Kind, Shape, Source, Variant};
 
 /// The sources of the settings.
-const FILES: [&str; 20] = [
+const FILES: [&str; 21] = [
     "src/node/config/mod.rs",
     "src/node/config/local_user.rs",
     "src/node/config/delivery.rs",
