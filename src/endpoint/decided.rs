@@ -6,7 +6,7 @@ use super::arrival::Arrival;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Outgoing, Remote};
 use crate::rights::{
-    self, Admitted, Decision, DecisionQueue, Told, Unaccepted, check_unrecorded, denial,
+    self, Admitted, Decision, DecisionQueue, InControl, Unaccepted, check_unrecorded, denial,
 };
 use crate::wire::Frame;
 
@@ -21,7 +21,7 @@ pub(super) struct Decisions {
     /// Whether what changes something is refused, because it could not be recorded.
     is_refusing: bool,
     waiting: DecisionQueue<Remote>,
-    told: Told,
+    in_control: InControl,
 }
 
 impl Endpoint {
@@ -77,7 +77,8 @@ impl Endpoint {
         if !self.decisions.is_recording || is_session(from) {
             return;
         }
-        if let Some(passed) = Decision::of(frame, Ok(()), &self.config.access.table) {
+        let table = &self.config.access.table;
+        if let Some(passed) = self.decisions.in_control.decision(frame, Ok(()), table) {
             self.record(passed, from);
         }
     }
@@ -90,7 +91,7 @@ impl Endpoint {
         let (client, payload) = (message.destination, message.payload.clone());
         let frame = Frame::new(message.source, client, payload);
         let table = &self.config.access.table;
-        if let Some(told) = self.decisions.told.decision(&frame, table)
+        if let Some(told) = self.decisions.in_control.told(&frame, table)
             && let Some((path, _)) = self.route(client)
         {
             self.record(told, path.peer);

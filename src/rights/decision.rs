@@ -37,8 +37,8 @@ pub struct Decision {
     pub destination: JausId,
     /// What was decided.
     pub verdict: Verdict,
-    /// Whether a message that passed needs no right, such as Release Control; or control has ended that was
-    /// not granted before.
+    /// Whether a message that passed needs no right, such as Release Control; or changes nothing, as
+    /// [`InControl`](super::InControl) tells.
     pub is_free: bool,
 }
 
@@ -113,7 +113,7 @@ impl Decision {
     pub const fn weight(&self) -> Weight {
         match self.verdict {
             Verdict::Refused(_) | Verdict::Denied => Weight::Refusal,
-            Verdict::Passed | Verdict::Ended if self.is_free => Weight::Free,
+            Verdict::Passed | Verdict::Granted | Verdict::Ended if self.is_free => Weight::Free,
             _ => Weight::Evidence,
         }
     }

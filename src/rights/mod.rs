@@ -56,19 +56,19 @@
 mod accept;
 mod carried;
 mod decision;
+mod in_control;
 mod queue;
 mod selection;
 mod table;
-mod told;
 mod words;
 
 pub(crate) use accept::admit as admit_by_grants;
 pub use accept::{Acceptance, Grant, GrantError, Unaccepted};
 pub use decision::{Decision, Verdict, Weight, check_unrecorded, denial};
+pub use in_control::InControl;
 pub use queue::{Decided, DecisionQueue, Weighted, WeightedQueue};
 pub use selection::{Selection, UnknownName};
 pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
-pub use told::Told;
 pub use words::RuleError;
 
 use crate::address::JausId;

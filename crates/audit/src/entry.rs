@@ -95,16 +95,17 @@ impl Entry {
             let entry = Self::new(&who, what, result).by(&decision.what);
             entry.id(destination).to(source)
         };
-        match decision.verdict {
+        let entry = match decision.verdict {
             Verdict::Refused(why) => by_client(Outcome::Refused).because(why),
             Verdict::Granted => by_component(Action::ControlGranted, Outcome::Allowed),
             Verdict::Denied => by_component(Action::ControlDenied, Outcome::Refused),
             Verdict::Ended => by_component(Action::ControlEnded, Outcome::Allowed),
             // It was passed on.
-            _ => Self {
-                is_free: decision.is_free,
-                ..by_client(Outcome::Allowed)
-            },
+            _ => by_client(Outcome::Allowed),
+        };
+        Self {
+            is_free: decision.is_free,
+            ..entry
         }
     }
 
@@ -178,7 +179,23 @@ fn rfc3339<S: Serializer>(time: &SystemTime, to: S) -> Result<S::Ok, S::Error> {
 
 #[cfg(test)]
 mod tests {
+    use jaus::address::JausId;
+    use jaus::rights::{InControl, Table};
+    use jaus::wire::Frame;
+
     use super::*;
+
+    #[test]
+    fn control_that_is_renewed_is_no_evidence() {
+        let (console, rover) = (JausId::new(60, 1, 1), JausId::new(101, 1, 1));
+        let mut in_control = InControl::default();
+        let mut confirm = || {
+            let confirm = Frame::new(rover, console, vec![0x0F, 0, 0].into());
+            in_control.told(&confirm, &Table::default()).unwrap()
+        };
+        assert!(Entry::of("console", &confirm()).is_evidence());
+        assert!(!Entry::of("console", &confirm()).is_evidence());
+    }
 
     #[test]
     fn every_text_of_an_entry_is_printable_and_bounded() {

@@ -16,7 +16,7 @@ use jaus::codec::Message as _;
 use jaus::endpoint::{Remote, SessionId, To, Transmit};
 use jaus::link::custom::Arrival;
 use jaus::messages::core::QueryIdentification;
-use jaus::rights::{Acceptance, DecisionQueue, Table, Told};
+use jaus::rights::{Acceptance, DecisionQueue, InControl, Table};
 use jaus::wire::{Acknowledgement, DataControl, Frame, Version, judp};
 
 use crate::arrivals::Arrivals;
@@ -107,7 +107,7 @@ pub struct Exchange {
     /// Whether what cannot be recorded is refused.
     is_refusing: bool,
     decisions: DecisionQueue<BridgeId>,
-    told: Told,
+    in_control: InControl,
     counters: Counters,
 }
 
@@ -134,7 +134,7 @@ impl Exchange {
             owners: Notices::default(),
             is_refusing: false,
             decisions: DecisionQueue::default(),
-            told: Told::default(),
+            in_control: InControl::default(),
             counters: Counters::default(),
         }
     }

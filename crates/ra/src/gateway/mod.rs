@@ -51,7 +51,7 @@ use crate::message::Message;
 use crate::node::{self, RaNode};
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
-use jaus::rights::{DecisionQueue, Told};
+use jaus::rights::{DecisionQueue, InControl};
 use jaus::service::{
     Change, Discovery, Event, Kind, Liveness, Profile, Scope, Stack, Timing, Transport,
 };
@@ -81,7 +81,7 @@ pub struct Gateway {
     shown: BTreeMap<u16, u8>,
     actions: VecDeque<Action>,
     decisions: DecisionQueue<RaId>,
-    told: Told,
+    in_control: InControl,
     /// Whether what cannot be recorded is refused.
     is_refusing: bool,
     tally: Tally,
@@ -151,7 +151,7 @@ impl Gateway {
             shown: BTreeMap::new(),
             actions: VecDeque::new(),
             decisions: DecisionQueue::default(),
-            told: Told::default(),
+            in_control: InControl::default(),
             is_refusing: false,
             tally: Tally::default(),
         })

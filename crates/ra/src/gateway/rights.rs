@@ -25,7 +25,7 @@ impl Gateway {
         while let Some(message) = proxy.poll_transmit() {
             let frame = frame_of(&message);
             let checked = self.check_sent(&frame, &table);
-            if let Some(decision) = Decision::of(&frame, checked, &table) {
+            if let Some(decision) = self.in_control.decision(&frame, checked, &table) {
                 self.record(now, decision, proxy.ra());
             }
             match checked {
@@ -60,7 +60,7 @@ impl Gateway {
         };
         let ra = proxy.ra();
         let frame = Frame::new(message.source, message.to, message.payload.clone());
-        if let Some(told) = self.told.decision(&frame, &Table::default()) {
+        if let Some(told) = self.in_control.told(&frame, &Table::default()) {
             self.record(now, told, ra);
         }
     }

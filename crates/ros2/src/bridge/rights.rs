@@ -16,7 +16,7 @@ use jaus::messages::mobility::{
 };
 use jaus::node::Recorder;
 use jaus::rights::{
-    Decision, DecisionQueue, Refusal, Rules, Table, Told, Unaccepted, check_unrecorded,
+    Decision, DecisionQueue, InControl, Refusal, Rules, Table, Unaccepted, check_unrecorded,
 };
 use jaus::wire::Frame;
 use jaus_vehicle::messages::ground::{SetDestination, StopMission};
@@ -36,7 +36,7 @@ pub(super) struct Rights {
     /// All components of the vehicle, for messages whose component is not known yet.
     vehicle: JausId,
     recorder: Option<Recorder<Gid>>,
-    told: Told,
+    in_control: InControl,
 }
 
 /// A message that the bridge does not send.
@@ -77,7 +77,7 @@ impl Rights {
             from,
             vehicle: JausId::new(subsystem, JausId::ANY_NODE, JausId::ANY_COMPONENT),
             recorder,
-            told: Told::default(),
+            in_control: InControl::default(),
         }
     }
 
@@ -200,7 +200,8 @@ impl Rights {
     }
 
     fn record_passed(&mut self, by: Gid, frame: &Frame) {
-        self.record(by, Decision::of(frame, Ok(()), &self.table));
+        let passed = self.in_control.decision(frame, Ok(()), &self.table);
+        self.record(by, passed);
     }
 
     /// Records what a component says about the control that was requested for a publisher.
@@ -212,7 +213,7 @@ impl Rights {
         };
         let Ok(message) = message else { return };
         let told = Frame::new(component, self.from, message);
-        let decision = self.told.decision(&told, &self.table);
+        let decision = self.in_control.told(&told, &self.table);
         self.record(by, decision);
     }
 

@@ -40,7 +40,7 @@ use bytes::{Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::{Table, Told, WeightedQueue};
+use jaus::rights::{InControl, Table, WeightedQueue};
 use quinn_proto::{
     ClientConfig, ConnectionError, ConnectionHandle, DatagramEvent, Endpoint, Event, StreamEvent,
 };
@@ -113,7 +113,7 @@ pub struct Transport {
     /// How many of them were sent since the connections had their turn.
     responded: usize,
     records: WeightedQueue<Record>,
-    told: Told,
+    in_control: InControl,
     counters: Counters,
     budget: Option<Budget>,
     /// How often a session was served within the budget.
@@ -167,7 +167,7 @@ impl Transport {
             responses: VecDeque::new(),
             responded: 0,
             records: WeightedQueue::default(),
-            told: Told::default(),
+            in_control: InControl::default(),
             counters: Counters::default(),
             budget: None,
             turns: 0,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::{BufMut as _, Bytes, BytesMut};
 use jaus::endpoint::SessionId;
 use jaus::link::custom::Arrival;
-use jaus::rights::{Admitted, Decision, Unaccepted, check_unrecorded, denial};
+use jaus::rights::{Admitted, Unaccepted, check_unrecorded, denial};
 use jaus::wire::{Frame, Priority, judp};
 use quinn_proto::StreamId;
 
@@ -92,7 +92,7 @@ impl Transport {
             return;
         };
         for frame in frames.map_while(Result::ok) {
-            if let Some(told) = self.told.decision(&frame, &self.table) {
+            if let Some(told) = self.in_control.told(&frame, &self.table) {
                 self.record(id, Act::Decided(told));
             }
         }
@@ -182,7 +182,7 @@ impl Transport {
                 return false;
             }
         };
-        if let Some(decision) = Decision::of(frame, accepted, &self.table) {
+        if let Some(decision) = self.in_control.decision(frame, accepted, &self.table) {
             match accepted {
                 Ok(()) => {}
                 // Of a peer that speaks for others, nobody can be answered.

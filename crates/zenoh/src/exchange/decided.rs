@@ -37,7 +37,7 @@ impl Exchange {
             Ok(admitted)
         });
         let checked = admitted.as_ref().map(|_| ()).map_err(|why| *why);
-        if let Some(decision) = Decision::of(frame, checked, &self.table) {
+        if let Some(decision) = self.in_control.decision(frame, checked, &self.table) {
             if let Err(Unaccepted::Rule(refusal)) = checked {
                 self.refuse(now, from, frame, (&decision, refusal));
             }
@@ -62,7 +62,7 @@ impl Exchange {
     /// Records what a component of this side tells a client of a bridge about its control.
     pub(super) fn record_answer(&mut self, frame: &Frame, to: Recipient) {
         if let Recipient::Bridge(client) = to
-            && let Some(told) = self.told.decision(frame, &self.table)
+            && let Some(told) = self.in_control.told(frame, &self.table)
         {
             self.record(told, client);
         }
