@@ -103,7 +103,7 @@ impl Access {
     /// # Errors
     /// Why it is refused.
     pub fn admit(&self, frame: &Frame, from: Remote) -> Result<Admitted, Unaccepted> {
-        if self.grants.is_empty() || matches!(from, Remote::Session(_)) {
+        if self.grants.is_empty() || from.is_session() {
             return Ok(Admitted::Whole);
         }
         rights::admit_by_grants(&self.grants, frame, &self.table)

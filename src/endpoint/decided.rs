@@ -72,9 +72,14 @@ impl Endpoint {
         }
     }
 
+    /// Whether messages of a remote end are recorded here.
+    pub(super) const fn records(&self, from: Remote) -> bool {
+        self.decisions.is_recording && !from.is_session()
+    }
+
     /// Records a message that was delivered or passed on.
     pub(super) fn record_passed(&mut self, frame: &Frame, from: Remote) {
-        if !self.decisions.is_recording || is_session(from) {
+        if !self.records(from) {
             return;
         }
         let table = &self.config.access.table;
@@ -101,22 +106,17 @@ impl Endpoint {
     fn admit(&self, frame: &Frame, from: Remote) -> Result<Admitted, Unaccepted> {
         let access = &self.config.access;
         let admitted = access.admit(frame, from)?;
-        if self.decisions.is_refusing && !is_session(from) {
+        if self.decisions.is_refusing && !from.is_session() {
             check_unrecorded(frame, &access.table).map_err(Unaccepted::Rule)?;
         }
         Ok(admitted)
     }
 
     fn record(&mut self, decision: Decision, client: Remote) {
-        let is_plain = !is_session(client);
+        let is_plain = !client.is_session();
         if self.decisions.is_recording && is_plain && !self.decisions.waiting.push(decision, client)
         {
             self.counters.add(Counter::DecisionsLost);
         }
     }
-}
-
-/// Whether the link has sessions, and so decides and records itself.
-const fn is_session(remote: Remote) -> bool {
-    matches!(remote, Remote::Session(_))
 }

@@ -246,7 +246,8 @@ impl Endpoint {
         Err(Counter::UnawaitedAcknowledgement)
     }
 
-    /// Refuses senders that are denied by id, that belong to a secure link, or bound or configured to be at another address.
+    /// Refuses senders that are denied by id, that belong to a secure link, or that are bound or configured to be
+    /// at another address.
     fn refuse_misplaced(&mut self, arrival: Arrival<'_>) -> Result<(), Counter> {
         let (id, path) = (arrival.frame.source, arrival.path);
         self.config.access.check_subsystem(id)?;
@@ -431,7 +432,8 @@ impl Endpoint {
             });
             self.counters.add(Counter::MessagesDelivered);
         }
-        if let Some(path) = message.path.filter(|_| is_delivered) {
+        let recorded = |it: &Path| is_delivered && self.records(it.peer);
+        if let Some(path) = message.path.filter(recorded) {
             let frame = Frame::new(source, destination, message.payload.clone());
             self.record_passed(&frame, path.peer);
         }

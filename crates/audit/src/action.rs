@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-/// What was done. It has the same words whoever did it: a client by a message, a user of the page, or a
+/// What was done. The words are the same for a client that sends a message, a user of the page, and a
 /// component that answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]

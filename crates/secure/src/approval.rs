@@ -14,8 +14,8 @@
 //! ```
 //!
 //! A certificate contains the signatures of what it allows, so the key of the authority is not enough to issue one.
-//! Removing a line, or revoking a certificate, needs no approval. The file of approvers is what the rest depends on: who can change it,
-//! or the settings of the services, needs nobody else.
+//! Removing a line, or revoking a certificate, needs no approval. The rest depends on the file of approvers: one
+//! person who can change it, or the settings of the services, can do everything alone.
 
 use std::fmt;
 use std::io;
@@ -447,7 +447,7 @@ mod tests {
     }
 
     impl Scene {
-        /// Two approvers, of whom anna has two keys, and somebody else.
+        /// Two approvers, of whom anna has two keys, and a third person, who is none.
         fn new() -> Self {
             let folder = tempfile::tempdir().unwrap();
             let path = |name: &str| folder.path().join(name);
@@ -500,7 +500,7 @@ mod tests {
             .control
             .propose(&line, &scene.key("anna"), NOW)
             .unwrap();
-        // Whoever writes the file by hand gets nothing.
+        // To write the file by hand gains nothing.
         edit::put(&trusted_keys, &line).unwrap();
         assert!(scene.refusal().contains("`console`"), "{}", scene.refusal());
         let approve = |name: &str| scene.control.approve(&proposal.id(), &scene.key(name), NOW);

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 
 use super::recent::Recent;
-use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, Remote, To, Transmit};
+use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, To, Transmit};
 use crate::wire::{Acknowledgement, EncodeError, Flags, Frame, Framing, Priority, as5669a, judp};
 pub(super) use fragmented::FragmentedSend;
 use join::may_pack;
@@ -123,7 +123,7 @@ impl Egress {
 
     /// Whether a path leads through datagrams rather than a connection or line.
     pub(super) fn is_datagram(&self, path: Path) -> bool {
-        self.framing(path.link) == Framing::Judp && !matches!(path.peer, Remote::Session(_))
+        self.framing(path.link) == Framing::Judp && !path.peer.is_session()
     }
 
     /// Whether `count` more datagrams of a priority fit.

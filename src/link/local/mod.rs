@@ -44,4 +44,4 @@ pub(crate) use listener::Listener;
 #[cfg(unix)]
 pub use owner_socket::OwnerSocket;
 pub use stream::Process;
-pub(crate) use stream::{Credentials, Stream, connect};
+pub(crate) use stream::{OtherEnd, Stream, connect};

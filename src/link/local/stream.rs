@@ -46,12 +46,12 @@ impl fmt::Display for Process {
 pub(crate) struct Stream {
     pub(crate) read: ReadHalf,
     pub(crate) write: WriteHalf,
-    pub(crate) peer: Credentials,
+    pub(crate) peer: OtherEnd,
 }
 
 /// What the operating system reports of the other end; of a TCP connection nothing.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Credentials {
+pub(crate) struct OtherEnd {
     /// Its process.
     pub(crate) pid: Option<u32>,
     /// Its user.
@@ -74,7 +74,7 @@ mod on_unix {
     use tokio::io::Interest;
     use tokio::io::unix::AsyncFd;
 
-    use super::{Assembler, Credentials, Stream};
+    use super::{Assembler, OtherEnd, Stream};
     use crate::link::watch::watch;
 
     /// The reading half of a stream.
@@ -90,7 +90,7 @@ mod on_unix {
     }
 
     impl Stream {
-        pub(super) fn new(socket: impl Into<Socket>, peer: Credentials) -> io::Result<Self> {
+        pub(super) fn new(socket: impl Into<Socket>, peer: OtherEnd) -> io::Result<Self> {
             let socket = Arc::new(socket.into());
             Ok(Self {
                 read: ReadHalf(watch(socket.clone(), Interest::READABLE)?),
@@ -168,7 +168,7 @@ mod elsewhere {
     use tokio::io::AsyncReadExt;
     use tokio::net::{TcpStream, tcp};
 
-    use super::{Assembler, Credentials, Stream};
+    use super::{Assembler, OtherEnd, Stream};
 
     #[derive(Debug)]
     pub(crate) struct ReadHalf(tcp::OwnedReadHalf);
@@ -177,7 +177,7 @@ mod elsewhere {
     pub(crate) struct WriteHalf(tcp::OwnedWriteHalf);
 
     impl Stream {
-        pub(super) fn new(stream: std::net::TcpStream, peer: Credentials) -> io::Result<Self> {
+        pub(super) fn new(stream: std::net::TcpStream, peer: OtherEnd) -> io::Result<Self> {
             let (read, write) = TcpStream::from_std(stream)?.into_split();
             let (read, write) = (ReadHalf(read), WriteHalf(write));
             Ok(Self { read, write, peer })
@@ -213,7 +213,7 @@ mod elsewhere {
 pub(super) fn tcp_stream(stream: TcpStream) -> io::Result<Stream> {
     // Records are collected before they are written, so waiting for more would only delay them.
     let _ = stream.set_nodelay(true);
-    Stream::new(stream.into_std()?, Credentials::default())
+    Stream::new(stream.into_std()?, OtherEnd::default())
 }
 
 /// Both halves of a Unix stream, and the user id of the other end.
@@ -221,11 +221,11 @@ pub(super) fn tcp_stream(stream: TcpStream) -> io::Result<Stream> {
 pub(super) fn unix_stream(stream: UnixStream) -> io::Result<(Stream, u32)> {
     let peer = stream.peer_cred()?;
     let uid = peer.uid();
-    let credentials = Credentials {
+    let other = OtherEnd {
         pid: pid_of(&peer),
         uid: Some(uid),
     };
-    Ok((Stream::new(stream.into_std()?, credentials)?, uid))
+    Ok((Stream::new(stream.into_std()?, other)?, uid))
 }
 
 /// The process id of the other end, from its credentials.

@@ -30,7 +30,7 @@ use crate::endpoint::AttachError;
 use crate::link::local::record::{
     Head, LONGEST_HEAD, LONGEST_HELLO, Reason, Record, RecordError, VERSION,
 };
-use crate::link::local::{Credentials, Error, Listener, Process, Reader, Stream, Writer};
+use crate::link::local::{Error, Listener, OtherEnd, Process, Reader, Stream, Writer};
 
 /// Limit of connections whose component is not attached yet. If there are more, the oldest of the user with
 /// the most gives way, so that no number of silent ones keeps a component out.
@@ -90,7 +90,7 @@ pub(super) async fn serve(
 /// refusal.
 async fn attach(shared: &Arc<Shared>, stream: Stream) -> Option<(Session, Reader)> {
     let Stream { read, write, peer } = stream;
-    let Credentials { pid, uid } = peer;
+    let OtherEnd { pid, uid } = peer;
     let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
     let hello = async {
         let record = reader.read().await?;

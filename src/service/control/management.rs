@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::{Condition, Control};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::endpoint::{Received, Remote};
+use crate::endpoint::Received;
 use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Shutdown, Standby,
     report_status,
@@ -234,7 +234,7 @@ impl Control {
 fn may_clear_all(message: &Received) -> bool {
     let is_checked = match message.path {
         None => true,
-        Some(path) => matches!(path.peer, Remote::Session(_)),
+        Some(path) => path.peer.is_session(),
     };
     is_checked && clears_all(&message.payload)
 }

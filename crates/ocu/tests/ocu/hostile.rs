@@ -247,7 +247,8 @@ async fn of_a_thousand_sockets_most_are_refused_and_the_pages_that_stand_keep_wo
     .await;
 }
 
-/// Connects from another address of this computer, on Linux: 127.0.0.2, 127.0.0.3 and so on; `None` if the station has closed the connection at once.
+/// Connects from another address of this computer, on Linux: 127.0.0.2, 127.0.0.3 and so on; `None` if the station
+/// has closed the connection at once.
 async fn connect_from(host: u8, scene: &Scene, first: &[u8]) -> Option<TcpStream> {
     let socket = TcpSocket::new_v4().unwrap();
     let elsewhere = Ipv4Addr::new(127, 0, 0, host);

@@ -67,7 +67,7 @@ impl Default for Settings {
             timeout: Duration::from_secs(4),
             max_components: 253,
             gather: Duration::from_millis(300),
-            // Whoever may look may stop.
+            // A client that may look may stop.
             grants: Acceptance::new([Grant {
                 ids: JausId::EVERYONE,
                 rules: Rules::default(),

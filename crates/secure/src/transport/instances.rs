@@ -241,7 +241,7 @@ impl Transport {
 }
 
 impl Session {
-    /// Notes whether packets have come that QUIC has authenticated: anybody can send others.
+    /// Notes whether packets have come that QUIC has authenticated: others may come from any sender.
     pub(super) fn note_packets(&mut self, now: Instant) {
         let frames = self.connection.stats().frame_rx;
         let frames = frames.acks + frames.ping + frames.datagram + frames.stream;

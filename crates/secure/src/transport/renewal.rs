@@ -71,7 +71,7 @@ impl Transport {
         }
     }
 
-    /// Tells the node for which ids the peers may speak, so that it believes nobody else in these ids:
+    /// Tells the node for which ids the peers may speak, so that it believes no other link in these ids:
     /// those of all trusted keys, and those of the certificates that were shown so far.
     pub(super) fn tell_spoken(&mut self) {
         let mut spoken = self.credentials.trust().ids();

@@ -71,13 +71,34 @@ fn says_why_the_vehicle_is_held(page: &mut Browser) {
     page.wait("document.querySelector('#held').hidden");
 }
 
-/// While the vehicle moves, the button says that it stops; and how fast it still is, unless it rests before it has
-/// confirmed the stop.
+/// While the vehicle moves, the button says that it stops, and how fast it still is.
 fn says_stopped_only_at_rest(page: &mut Browser) {
+    const ATTEMPTS: u32 = 4;
+    const STOPPING: &str = "said.some(([text]) => /Stopping[0-9.]+ m\\/s/.test(text))";
     page.value(&format!(
         "(globalThis.said = []), setInterval(() => said.push([document.querySelector('#estop').textContent, \
          {SPEED}]), 20), 0"
     ));
+    stops_while_it_drives(page);
+    for _ in 1..ATTEMPTS {
+        if page.value(STOPPING) == json!(true) {
+            break;
+        }
+        // A busy machine confirms the stop when the vehicle rests already.
+        clears_the_emergency(page);
+        take_control(page);
+        page.press("[data-show=drive]");
+        stops_while_it_drives(page);
+    }
+    let wrong =
+        page.value("said.filter(([text, speed]) => text.includes('is stopped') && speed >= 0.1)");
+    assert_eq!(wrong, json!([]));
+    assert_eq!(page.value(STOPPING), true, "{}", page.value("said"));
+    look_from_all_screens(page, "8-stopped");
+    clears_the_emergency(page);
+}
+
+fn stops_while_it_drives(page: &mut Browser) {
     page.drive(
         |page| page.hold("#stick", (0.0, 0.9)),
         Browser::let_go,
@@ -88,14 +109,9 @@ fn says_stopped_only_at_rest(page: &mut Browser) {
     page.wait("document.body.dataset.emergency === 'stopped'");
     page.wait("document.body.dataset.alarm === 'bad'");
     page.let_go();
-    let wrong =
-        page.value("said.filter(([text, speed]) => text.includes('is stopped') && speed >= 0.1)");
-    assert_eq!(wrong, json!([]));
-    let stopping = page.value(
-        "said.some(([text, speed]) => /Stopping([0-9.]+ m\\/s|not confirmed yet)/.test(text) && speed >= 0.1)",
-    );
-    assert_eq!(stopping, true, "{}", page.value("said"));
-    look_from_all_screens(page, "8-stopped");
+}
+
+fn clears_the_emergency(page: &mut Browser) {
     page.press("#estop-clear");
     page.press("#clear-yes");
     page.wait("document.body.dataset.emergency === 'ready'");

@@ -57,7 +57,7 @@ fn a_key_that_one_person_trusts_gets_in_when_another_person_approves() {
     let answered = query();
     assert_eq!(answered.status, 0, "{answered:?}");
 
-    // Whoever writes the file by hand alone ends new sessions, and gets nothing.
+    // To write the file by hand ends new sessions, and gains nothing.
     let text = fs::read_to_string(&trusted_keys).unwrap();
     fs::write(
         &trusted_keys,
