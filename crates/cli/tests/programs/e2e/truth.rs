@@ -134,8 +134,11 @@ fn lists_the_events(page: &mut Browser) {
 /// The page that sees the end of a drive says so once, and a page that is opened later does not.
 fn tells_once_why_a_drive_has_ended(page: &mut Browser) {
     take_control(page);
-    page.hold("#stick", (0.0, -0.5));
-    page.wait(&format!("{SPEED} > 0.2"));
+    page.drive(
+        |page| page.hold("#stick", (0.0, -0.5)),
+        Browser::let_go,
+        &format!("{SPEED} > 0.2"),
+    );
     page.value("(until => { while (performance.now() < until); })(performance.now() + 900), 0");
     page.wait(&format!("{ENDINGS} === 1"));
     page.let_go();
