@@ -89,6 +89,8 @@ pub(super) struct DriveOrder {
     pub(super) waited: Result<Duration, TooOld>,
     /// When it has arrived.
     pub(super) at: Instant,
+    /// For how long the operator's hand counted without another sign, when it was sent.
+    pub(super) hand: Duration,
     pub(super) reply: Reply,
 }
 

@@ -140,6 +140,10 @@ pub enum OperatorRequest {
         forward: f64,
         /// Right, -1 to 1.
         turn: f64,
+        /// For so many milliseconds the operator's hand counts without another sign. Without it, until the page
+        /// ends the drive.
+        #[serde(default)]
+        hand_ms: Option<u64>,
         /// What the operator sees. Without it, the vehicle is not driven.
         #[serde(flatten)]
         seen: Option<Seen>,
@@ -187,6 +191,7 @@ fn of_code(code: u16) -> Bytes {
 #[serde(untagged)]
 enum ShortFrame {
     Drive(u64, u64, f64, f64),
+    DriveFor(u64, u64, f64, f64, u64),
     Seen(u64, u64),
     Received((u64,)),
     DriveEnd([u64; 0]),
@@ -194,8 +199,8 @@ enum ShortFrame {
 
 impl Frame {
     /// Reads a frame. An array of numbers is the short form of the most frequent ones: `[seen]` of
-    /// `received`, `[seen, held_ms]` of `seen`, `[seen, held_ms, forward, turn]` of `drive`, and `[]` of
-    /// `drive_end`.
+    /// `received`, `[seen, held_ms]` of `seen`, `[seen, held_ms, forward, turn]` of `drive`, with
+    /// `hand_ms` behind them or without, and `[]` of `drive_end`.
     ///
     /// # Errors
     /// If the text is no frame.
@@ -203,16 +208,21 @@ impl Frame {
         if !text.starts_with('[') {
             return serde_json::from_str(text);
         }
+        let drive = |seq, held_ms, forward, turn, hand_ms| {
+            Said::OperatorRequest(OperatorRequest::Drive {
+                forward,
+                turn,
+                hand_ms,
+                seen: Some(Seen { seq, held_ms }),
+            })
+        };
         let said = match serde_json::from_str(text)? {
             ShortFrame::Received((seen,)) => Said::Received { seen },
             ShortFrame::Seen(seq, held_ms) => Said::Seen(Seen { seq, held_ms }),
             ShortFrame::DriveEnd([]) => Said::OperatorRequest(OperatorRequest::DriveEnd),
-            ShortFrame::Drive(seq, held_ms, forward, turn) => {
-                Said::OperatorRequest(OperatorRequest::Drive {
-                    forward,
-                    turn,
-                    seen: Some(Seen { seq, held_ms }),
-                })
+            ShortFrame::Drive(seq, held, forward, turn) => drive(seq, held, forward, turn, None),
+            ShortFrame::DriveFor(seq, held, forward, turn, hand) => {
+                drive(seq, held, forward, turn, Some(hand))
             }
         };
         Ok(Self {
@@ -398,6 +408,7 @@ mod tests {
                 OperatorRequest::Drive {
                     forward: 0.5,
                     turn: -1.0,
+                    hand_ms: None,
                     seen: None,
                 },
             ),
@@ -406,6 +417,7 @@ mod tests {
                 OperatorRequest::Drive {
                     forward: 0.5,
                     turn: -1.0,
+                    hand_ms: None,
                     seen: Some(SEEN),
                 },
             ),
@@ -414,6 +426,16 @@ mod tests {
                 OperatorRequest::Drive {
                     forward: 0.5,
                     turn: -1.0,
+                    hand_ms: None,
+                    seen: Some(SEEN),
+                },
+            ),
+            (
+                "[12,40,0.5,-1,250]",
+                OperatorRequest::Drive {
+                    forward: 0.5,
+                    turn: -1.0,
+                    hand_ms: Some(250),
                     seen: Some(SEEN),
                 },
             ),

@@ -78,15 +78,19 @@ impl Stick {
     /// Dead-man timeout: without a push for this time, the vehicle stops. It runs from the operator's
     /// hand: what a push waits on its way to the station is part of it.
     pub const DEAD_MAN: Duration = Duration::from_millis(250);
+    /// The page lets go of a hand that gives no sign. By so much its release may be later than the push before.
+    const JITTER: Duration = Duration::from_millis(50);
     /// Maximum time to repeat the stop command without an acknowledgement. By then the vehicle's
     /// own timeout has stopped it.
     pub const STOPPING: Duration = Duration::from_secs(3);
 
-    /// Handles a push that has waited for `waited` on its way. One that has waited for longer than
+    /// Handles a push that has waited for `waited` on its way. When it was sent, the operator's hand counted for
+    /// `hand` without another sign. One that has waited for longer than that or than
     /// [`DEAD_MAN`](Self::DEAD_MAN) has no effect.
-    pub fn handle_push(&mut self, now: Instant, waited: Duration, push: Push) {
+    pub fn handle_push(&mut self, now: Instant, waited: Duration, hand: Duration, push: Push) {
         self.handle_time(now);
-        let left = Self::DEAD_MAN.saturating_sub(waited);
+        let counts = Self::DEAD_MAN.min(hand.saturating_add(Self::JITTER));
+        let left = counts.saturating_sub(waited);
         if left.is_zero() {
             return;
         }
@@ -164,6 +168,7 @@ mod tests {
     use super::*;
 
     const AT_ONCE: Duration = Duration::ZERO;
+    const HELD: Duration = Duration::MAX;
 
     fn ahead() -> Push {
         Push::new(0.5, 0.0).unwrap()
@@ -177,16 +182,16 @@ mod tests {
     fn what_is_pushed_holds_until_250_ms_of_silence_and_then_the_vehicle_is_stopped() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, AT_ONCE, ahead());
+        stick.handle_push(start, AT_ONCE, HELD, ahead());
         assert_eq!(stick.poll_push(start + ms(249)), Some(ahead()));
         assert!(!stick.fell_silent());
         assert_eq!(stick.poll_push(start + ms(250)), Some(Push::NONE));
         assert_eq!(stick.driven(), None);
         assert!(stick.fell_silent());
-        stick.handle_push(start + ms(400), AT_ONCE, ahead());
+        stick.handle_push(start + ms(400), AT_ONCE, HELD, ahead());
         stick.stop(start + ms(500));
         assert!(!stick.fell_silent(), "it was let go");
-        stick.handle_push(start + ms(600), AT_ONCE, ahead());
+        stick.handle_push(start + ms(600), AT_ONCE, HELD, ahead());
         stick.handle_time(start + ms(900));
         stick.forget_silence();
         assert!(!stick.fell_silent(), "the next operator did not");
@@ -196,11 +201,26 @@ mod tests {
     fn the_time_that_a_push_waits_on_its_way_is_part_of_the_silence() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, ms(200), ahead());
+        stick.handle_push(start, ms(200), HELD, ahead());
         assert_eq!(stick.poll_push(start + ms(49)), Some(ahead()));
         assert_eq!(stick.poll_push(start + ms(50)), Some(Push::NONE));
-        stick.handle_push(start + ms(60), ms(250), ahead());
+        stick.handle_push(start + ms(60), ms(250), HELD, ahead());
         assert_eq!(stick.poll_push(start + ms(60)), Some(Push::NONE));
+    }
+
+    #[test]
+    fn a_push_holds_no_longer_than_the_hand_counts_that_gives_no_sign_any_more() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, AT_ONCE, ms(100), ahead());
+        assert_eq!(stick.poll_push(start + ms(149)), Some(ahead()));
+        assert_eq!(stick.poll_push(start + ms(150)), Some(Push::NONE));
+        assert!(stick.fell_silent());
+        stick.handle_push(start + ms(200), ms(100), ms(60), ahead());
+        assert_eq!(stick.poll_push(start + ms(209)), Some(ahead()));
+        assert_eq!(stick.poll_push(start + ms(210)), Some(Push::NONE));
+        stick.handle_push(start + ms(300), ms(100), ms(50), ahead());
+        assert_eq!(stick.poll_push(start + ms(300)), Some(Push::NONE));
     }
 
     #[test]
@@ -209,7 +229,7 @@ mod tests {
         let mut stick = Stick::default();
         for step in 0..50 {
             let now = start + ms(100 * step);
-            stick.handle_push(now, AT_ONCE, ahead());
+            stick.handle_push(now, AT_ONCE, HELD, ahead());
             assert_eq!(stick.poll_push(now + ms(99)), Some(ahead()));
         }
     }
@@ -218,7 +238,7 @@ mod tests {
     fn the_vehicle_is_told_to_stop_until_it_acknowledges_that() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, AT_ONCE, ahead());
+        stick.handle_push(start, AT_ONCE, HELD, ahead());
         stick.stop(start + ms(10));
         assert_eq!(stick.poll_push(start + ms(20)), Some(Push::NONE));
         assert_eq!(stick.poll_push(start + ms(2000)), Some(Push::NONE));
@@ -230,7 +250,7 @@ mod tests {
     fn a_vehicle_that_never_acknowledges_is_left_to_its_own_rule() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, AT_ONCE, ahead());
+        stick.handle_push(start, AT_ONCE, HELD, ahead());
         stick.stop(start);
         assert_eq!(
             stick.poll_push(start + Stick::STOPPING - ms(1)),
@@ -243,9 +263,9 @@ mod tests {
     fn a_late_acknowledgement_of_a_stop_does_not_stop_who_drives_again() {
         let start = Instant::now();
         let mut stick = Stick::default();
-        stick.handle_push(start, AT_ONCE, ahead());
+        stick.handle_push(start, AT_ONCE, HELD, ahead());
         stick.stop(start);
-        stick.handle_push(start + ms(10), AT_ONCE, ahead());
+        stick.handle_push(start + ms(10), AT_ONCE, HELD, ahead());
         stick.handle_stopped();
         assert_eq!(stick.poll_push(start + ms(20)), Some(ahead()));
     }

@@ -19,6 +19,8 @@ export class Drive {
   #input = new Input();
   #events;
   #timer = 0;
+  /** So long the hand counts by the last setpoint. */
+  #toldExpiry = Infinity;
   #obstacle = "No reports from the vehicle yet.";
   #isShown = false;
   #confirmed = null;
@@ -88,7 +90,7 @@ export class Drive {
 
   /** Something was taken up, or a drive may be over. */
   #handleInput() {
-    if (this.#input.owner && !this.#timer) {
+    if (this.#input.owner && (!this.#timer || this.#isRenewed())) {
       this.#tick();
     } else if (!this.#input.owner && this.#timer) {
       clearTimeout(this.#timer);
@@ -101,14 +103,21 @@ export class Drive {
     else if (notice) toast("warn", notice);
   }
 
+  /** Whether the hand has given a sign, and the one of which the station knows expires before the next setpoint. */
+  #isRenewed() {
+    return this.#toldExpiry - performance.now() < PERIOD && this.#input.expiry > this.#toldExpiry;
+  }
+
   #tick() {
+    clearTimeout(this.#timer);
     const now = performance.now();
     const setpoint = this.#input.poll(now, this.#events.captured);
     // A proof that expires ends the drive then, not with the next setpoint. A timer may be early by a fraction.
     this.#timer = setTimeout(() => this.#tick(), Math.min(PERIOD, this.#input.expiry - now + 1));
     if (!setpoint) return this.#handleInput();
     const [forward, turn] = setpoint.vector.map((value) => Math.round(value * this.#limit * 1000) / 1000);
-    if (!this.#link.setpoint({ forward, turn })) return this.end("the connection takes no commands");
+    this.#toldExpiry = this.#input.expiry;
+    if (!this.#link.setpoint({ forward, turn, expiry: this.#toldExpiry })) return this.end("the connection takes no commands");
     this.#render([forward, turn], setpoint.source);
   }
 

@@ -4,6 +4,7 @@
 //
 // Frames to the station: [seq, held] confirms that the state `seq` is shown, `held` milliseconds after it
 // arrived, [seq] that it has arrived but is not shown, [seq, held, forward, turn] drives, and [] ends that.
+// [seq, held, forward, turn, hand] drives by a hand that counts for `hand` milliseconds without another sign.
 
 /** A setpoint that has waited this long is not sent any more, in milliseconds. */
 const LONGEST_WAIT = 200;
@@ -70,11 +71,12 @@ export class Flow {
     this.#estimate = roundTrip ?? 0;
   }
 
-  /** Drives; false if the setpoint cannot reach the station now. */
-  setpoint({ forward, turn }) {
+  /** Drives by a hand that counts until `expiry` without another sign; false if the setpoint cannot reach the
+   * station now. */
+  setpoint({ forward, turn, expiry = Infinity }) {
     const now = this.#now();
     if (this.#seen === null || now - (this.#underWay[0] ?? now) > STUCK) return false;
-    this.#waiting = { forward: thousandths(forward), turn: thousandths(turn), at: now };
+    this.#waiting = { forward: thousandths(forward), turn: thousandths(turn), expiry, at: now };
     return !this.#mayDrive() || this.#next();
   }
 
@@ -116,10 +118,11 @@ export class Flow {
 
   /** Sends the setpoint that waits; false if there is none, or no connection. */
   #next() {
-    const setpoint = this.#waiting;
+    const [setpoint, now] = [this.#waiting, this.#now()];
     this.#waiting = null;
-    if (setpoint === null || this.#now() - setpoint.at > LONGEST_WAIT) return false;
-    if (!this.#send([this.#seen, this.#held(), setpoint.forward, setpoint.turn])) return false;
+    if (setpoint === null || now - setpoint.at > LONGEST_WAIT || now >= setpoint.expiry) return false;
+    const hand = setpoint.expiry === Infinity ? [] : [Math.ceil(setpoint.expiry - now)];
+    if (!this.#send([this.#seen, this.#held(), setpoint.forward, setpoint.turn, ...hand])) return false;
     this.#driving = true;
     this.#unconfirmed = false;
     return true;

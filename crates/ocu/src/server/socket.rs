@@ -252,11 +252,18 @@ impl Reader<'_> {
             Said::Active => {}
             Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
             Said::Overlay { zones } => self.overlay(frame.id, frame.vehicle, zones),
-            Said::OperatorRequest(OperatorRequest::Drive {
-                forward,
-                turn,
-                seen,
-            }) => self.drive(frame.id, (forward, turn), seen).await,
+            Said::OperatorRequest(
+                request @ OperatorRequest::Drive {
+                    forward,
+                    turn,
+                    hand_ms,
+                    seen,
+                },
+            ) => {
+                let hand = hand_ms.map_or(Duration::MAX, Duration::from_millis);
+                self.drive(frame.id, request, (forward, turn, hand), seen)
+                    .await;
+            }
             Said::OperatorRequest(request) => {
                 let known = (frame.press, frame.stops);
                 self.request(frame.id, frame.vehicle, request, known).await;
@@ -328,7 +335,13 @@ impl Reader<'_> {
 
     /// Judges the age of a setpoint, and passes it on. The session confirms it, so that the page
     /// sends the next one only then.
-    async fn drive(&mut self, id: Option<u64>, (forward, turn): (f64, f64), seen: Option<Seen>) {
+    async fn drive(
+        &mut self,
+        id: Option<u64>,
+        request: OperatorRequest,
+        (forward, turn, hand): (f64, f64, Duration),
+        seen: Option<Seen>,
+    ) {
         let now = now();
         let vehicle = self.snapshots.borrow().vehicle;
         let waited = match seen {
@@ -336,11 +349,6 @@ impl Reader<'_> {
             None => Err(TooOld::Unseen),
         };
         self.link.confirmed.notify_one();
-        let request = OperatorRequest::Drive {
-            forward,
-            turn,
-            seen,
-        };
         let reply = self.recorded(id, vehicle, request);
         if let Err(why) = self.visitor.check(&request, &self.shared.admission) {
             return reply(Err(why));
@@ -352,6 +360,7 @@ impl Reader<'_> {
             turn,
             waited,
             at: now,
+            hand,
             reply,
         };
         // On error the session has ended, which the writer notices.

@@ -56,7 +56,7 @@ impl Vehicle {
             return Err(why);
         }
         self.manual.forget();
-        self.manual.stick.handle_push(now, waited, push);
+        self.manual.stick.handle_push(now, waited, order.hand, push);
         self.steer(now, client);
         Ok(())
     }

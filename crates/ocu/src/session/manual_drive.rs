@@ -104,8 +104,7 @@ impl ManualDrive {
     /// Why driving ended without a release of the stick; empty otherwise.
     fn reason(&self) -> String {
         if self.stick.fell_silent() {
-            let limit = Stick::DEAD_MAN.as_millis();
-            return format!("no command from the page for {limit} ms: the vehicle was stopped");
+            return "no command from the page in time: the vehicle was stopped".to_owned();
         }
         self.ended.clone().unwrap_or_default()
     }

@@ -33,6 +33,21 @@ test("on a short link one setpoint is under way, and the newest replaces what wa
   assert.deepEqual(it.taken(), []);
 });
 
+test("a setpoint tells for how long the hand counts when it is sent, and is not sent after that", () => {
+  const it = rig();
+  it.flow.shown(1);
+  it.taken();
+  it.flow.setpoint({ ...push(0.1), expiry: 250 });
+  it.flow.setpoint({ ...push(0.2), expiry: 250 });
+  it.now = 99.5;
+  it.flow.confirmed();
+  assert.deepEqual(it.taken(), ["[1,0,0.1,0,250]", "[1,100,0.2,0,151]"]);
+  it.flow.setpoint({ ...push(0.3), expiry: 150 });
+  it.now = 150;
+  it.flow.confirmed();
+  assert.deepEqual(it.taken(), []);
+});
+
 test("the time that drawing takes is the page's own", () => {
   const it = rig();
   it.now = 100;
