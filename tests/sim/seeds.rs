@@ -3,10 +3,8 @@
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::io::Write;
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const THREADS: usize = 2;
 
@@ -32,9 +30,7 @@ pub(crate) fn for_kept_and_fresh_seeds(
     usual: u64,
     run: impl Fn(u64) -> Result<(), String> + Sync,
 ) -> bool {
-    for seed in kept_seeds(test, kept) {
-        run_seeds(test, seed..seed + 1, &run);
-    }
+    run_seeds(test, kept_seeds(test, kept), &run);
     // The operating system's randomness, through the hasher's keys. Fewer digits are easier to
     // type.
     let first = RandomState::new().hash_one(test) % 1_000_000_000_000;
@@ -55,16 +51,16 @@ pub(crate) fn for_kept_and_fresh_seeds(
 }
 
 /// Empty if `JAUS_SEED` chooses a seed.
-fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
+fn kept_seeds(test: &str, kept: &str) -> impl Iterator<Item = u64> {
     let lines = kept.lines().filter(|_| number_in("JAUS_SEED").is_none());
     let lines = lines.map(|line| line.split('#').next().unwrap_or_default());
     let words = lines.map(|line| line.split_whitespace().collect::<Vec<_>>());
-    let seed = |words: Vec<&str>| match words[..] {
+    let seed = move |words: Vec<&str>| match words[..] {
         [] => None,
         [name, seed] => (name == test).then(|| seed.parse().expect("a seed")),
         _ => panic!("a test and a seed are expected: {words:?}"),
     };
-    words.filter_map(seed).collect()
+    words.filter_map(seed)
 }
 
 /// Prints a line directly to standard error: the test harness hides the output of passing tests.
@@ -73,15 +69,18 @@ pub(crate) fn announce(line: &str) {
     let _written = writeln!(std::io::stderr().lock(), "{line}");
 }
 
-fn run_seeds(test: &str, seeds: Range<u64>, run: impl Fn(u64) -> Result<(), String> + Sync) {
-    let end = seeds.end;
-    let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
+fn run_seeds(
+    test: &str,
+    seeds: impl Iterator<Item = u64> + Send,
+    run: impl Fn(u64) -> Result<(), String> + Sync,
+) {
+    let (left, failed) = (Mutex::new(Some(seeds)), Mutex::new(Vec::new()));
+    let next = || {
+        let mut left = left.lock().expect("no panic");
+        left.as_mut().and_then(Iterator::next)
+    };
     let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= end {
-                return;
-            }
+        while let Some(seed) = next() {
             let outcome = catch_unwind(AssertUnwindSafe(|| run(seed)));
             let reason = match outcome {
                 Ok(Ok(())) => continue,
@@ -90,7 +89,7 @@ fn run_seeds(test: &str, seeds: Range<u64>, run: impl Fn(u64) -> Result<(), Stri
             };
             failed.lock().expect("no panic").push((seed, reason));
             // The remaining seeds would only repeat the failure.
-            next.fetch_add(end, Ordering::Relaxed);
+            *left.lock().expect("no panic") = None;
         }
     };
     std::thread::scope(|scope| {
