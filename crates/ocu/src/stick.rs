@@ -79,7 +79,7 @@ impl Stick {
     /// hand: what a push waits on its way to the station is part of it.
     pub const DEAD_MAN: Duration = Duration::from_millis(250);
     /// The page lets go of a hand that gives no sign. By so much its release may be later than the push before.
-    const JITTER: Duration = Duration::from_millis(50);
+    const JITTER: Duration = Duration::from_millis(25);
     /// Maximum time to repeat the stop command without an acknowledgement. By then the vehicle's
     /// own timeout has stopped it.
     pub const STOPPING: Duration = Duration::from_secs(3);
@@ -213,13 +213,13 @@ mod tests {
         let start = Instant::now();
         let mut stick = Stick::default();
         stick.handle_push(start, AT_ONCE, ms(100), ahead());
-        assert_eq!(stick.poll_push(start + ms(149)), Some(ahead()));
-        assert_eq!(stick.poll_push(start + ms(150)), Some(Push::NONE));
+        assert_eq!(stick.poll_push(start + ms(124)), Some(ahead()));
+        assert_eq!(stick.poll_push(start + ms(125)), Some(Push::NONE));
         assert!(stick.fell_silent());
-        stick.handle_push(start + ms(200), ms(100), ms(60), ahead());
+        stick.handle_push(start + ms(200), ms(100), ms(85), ahead());
         assert_eq!(stick.poll_push(start + ms(209)), Some(ahead()));
         assert_eq!(stick.poll_push(start + ms(210)), Some(Push::NONE));
-        stick.handle_push(start + ms(300), ms(100), ms(50), ahead());
+        stick.handle_push(start + ms(300), ms(100), ms(75), ahead());
         assert_eq!(stick.poll_push(start + ms(300)), Some(Push::NONE));
     }
 

@@ -72,8 +72,11 @@ impl ManualDrive {
             // Cannot happen: a push is within the range of the message.
             return;
         };
-        if let Err(error) = driver.send(&effort) {
-            tracing::debug!(%error, "setpoint not sent");
+        // A lossy link must lose both copies of each stop to let the vehicle move on for a beat.
+        for _copy in 0..if self.is_driven() { 1 } else { 2 } {
+            if let Err(error) = driver.send(&effort) {
+                tracing::debug!(%error, "setpoint not sent");
+            }
         }
         if self.is_driven() {
             // A stop that is still being delivered would brake again.
