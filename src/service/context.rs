@@ -85,9 +85,9 @@ impl<'a> Context<'a> {
         self.life.last_sign(client)
     }
 
-    /// Whether a setpoint is newer, by its sender's sequence numbers, than the sender's last one of its
-    /// kind and than its last stop. If so it counts as the newest one from now on. If not
-    /// it must not move anything: it is a late retransmission or was overtaken. Such setpoints are
+    /// Whether a setpoint is young enough, as far as its sender shows that, and newer, by the sender's sequence
+    /// numbers, than its last one of its kind and than its last stop. If so it counts as the newest one from now on. If not
+    /// it must not move anything: it was held up, is a late retransmission, or was overtaken. Such setpoints are
     /// counted ([`Stack::refused_setpoints`](super::Stack::refused_setpoints)).
     ///
     /// Call this once for each setpoint whose sender may command. [`Handlers`](super::Handlers) do
@@ -98,6 +98,11 @@ impl<'a> Context<'a> {
         message: &Received,
         validity: Validity,
     ) -> bool {
+        if validity != Validity::UntilDone && !self.life.admits(now, message) {
+            self.order
+                .refuse(message, "it may have been held up on its way");
+            return false;
+        }
         self.order.admits(now, message, validity)
     }
 

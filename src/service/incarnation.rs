@@ -54,10 +54,12 @@ impl Incarnation {
         Some(component.offers(incarnation::URN))
     }
 
-    /// The query of a component of this incarnation.
-    pub(in crate::service) const fn query(self) -> QueryIncarnation {
+    /// The query of a component of this incarnation, with a stamp that the answer echoes; 0 where that does not
+    /// matter.
+    pub(in crate::service) const fn query(self, stamp: u32) -> QueryIncarnation {
         QueryIncarnation {
             incarnation: self.number(),
+            stamp,
         }
     }
 }
@@ -75,15 +77,18 @@ impl Service for Incarnation {
         context: &mut Context<'_>,
     ) -> Handled {
         match code_of(&message.payload) {
-            Some(QueryIncarnation::CODE) if read::<QueryIncarnation>(message).is_some() => {
-                let report = ReportIncarnation {
-                    incarnation: self.number(),
-                };
-                context.reply(message, &report);
+            Some(QueryIncarnation::CODE) => {
+                if let Some(query) = read::<QueryIncarnation>(message) {
+                    let report = ReportIncarnation {
+                        incarnation: self.number(),
+                        stamp: query.stamp,
+                    };
+                    context.reply(message, &report);
+                }
                 Handled::Yes
             }
             // The stack has read it already.
-            Some(QueryIncarnation::CODE | ReportIncarnation::CODE) => Handled::Yes,
+            Some(ReportIncarnation::CODE) => Handled::Yes,
             _ => Handled::No,
         }
     }

@@ -14,7 +14,9 @@
 //! The client in control of a ready component is asked for its incarnation every
 //! [`Life::CHECK`] even if it is not silent: another number than before is a restart, however fast
 //! it was. One without that service is sent Query Heartbeat Pulse instead whenever it has sent
-//! nothing for [`Life::NUMBER_CHECK`], if it numbers its messages: the numbers show a restart.
+//! nothing for [`Life::NUMBER_CHECK`], if it numbers its messages: the numbers show a restart. The answers with an
+//! incarnation show how old what the client says can be (`freshness.rs`): when that becomes doubtful, it is asked more
+//! often.
 //!
 //! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
 //! answered a probe with a message, because a node also acknowledges for a component that hangs.
@@ -23,6 +25,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
 use super::discovery::Budget;
+use super::freshness::Freshness;
+use super::order::number_of;
 use super::restart_watch::{RestartWatch, Sameness};
 use super::{Incarnation, Outbox, code_of};
 use crate::address::JausId;
@@ -66,6 +70,8 @@ pub struct Life {
 struct Peer {
     /// Whether it is still the same.
     watch: RestartWatch,
+    /// How old what it says can be, if it tells its incarnation.
+    freshness: Freshness,
     /// When it was last asked whether it is still the same.
     asked: Option<Instant>,
     /// When it was last asked to tell its incarnation, which it has not told yet.
@@ -146,6 +152,7 @@ impl Life {
             self.due.insert((now + rank.patience(), id));
             Peer {
                 watch: RestartWatch::of(announced.map(|(_, _, incarnation)| incarnation)),
+                freshness: Freshness::default(),
                 asked: None,
                 introduced: None,
                 is_doubtful: false,
@@ -182,6 +189,10 @@ impl Life {
         if let Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE) = code_of(payload) {
             (peer.answers, peer.unanswered) = (true, 0);
         }
+        if let Ok(report) = ReportIncarnation::decode(payload) {
+            let number = number_of(message);
+            peer.freshness.note(now, report.stamp, number);
+        }
         match peer.watch.note(now, message) {
             Sameness::Same => {}
             Sameness::Doubtful => {
@@ -191,20 +202,42 @@ impl Life {
                 peer.look = now;
                 self.due.insert((now, id));
             }
-            Sameness::Restarted => self.restarted.push_back(id),
+            Sameness::Restarted => {
+                peer.freshness = Freshness::default();
+                self.restarted.push_back(id);
+            }
         }
     }
 
-    /// Asks a watched peer that offers [`Incarnation`] for its incarnation, unless it has told it
-    /// already: a client of this library does so before it requests control.
+    /// Whether a message of a client in control is so old that nothing may follow from it but a stop: it was held up
+    /// for longer than any retransmission. An echo has a stamp that says more than its number.
+    pub fn is_outdated(&self, message: &Received) -> bool {
+        let is_echo = code_of(&message.payload) == Some(ReportIncarnation::CODE);
+        let peer = self.peers.get(&message.source).filter(|_| !is_echo);
+        peer.zip(number_of(message))
+            .is_some_and(|(peer, number)| peer.freshness.is_outdated(number))
+    }
+
+    /// Whether a setpoint is young enough to move something, as far as its sender shows that: a client in control that
+    /// tells its incarnation must have echoed a recent stamp.
+    pub fn admits(&self, now: Instant, message: &Received) -> bool {
+        let peer = self.peers.get(&message.source);
+        peer.filter(|it| it.watch.incarnation().is_some())
+            .is_none_or(|it| it.freshness.admits(now, number_of(message)))
+    }
+
+    /// Asks a watched peer that offers [`Incarnation`] for its incarnation until it has answered once. A client of
+    /// this library tells it before it requests control, but not how old what it says can be.
     pub fn introduce(&mut self, now: Instant, id: JausId, out: &mut Outbox) {
         let Some(peer) = self.peers.get_mut(&id) else {
             return;
         };
         let is_due = peer.introduced.is_none_or(|at| now >= at + Self::CHECK);
-        if peer.watch.incarnation().is_none() && is_due {
+        let is_known = peer.watch.incarnation().is_some() && peer.freshness.last_sign().is_some();
+        if !is_known && is_due {
             (peer.introduced, peer.asked) = (Some(now), Some(now));
-            out.send_with(id, Priority::High, &self.own.query());
+            let stamp = peer.freshness.stamp(now);
+            out.send_with(id, Priority::High, &self.own.query(stamp));
         }
     }
 
@@ -217,15 +250,17 @@ impl Life {
         }
     }
 
-    /// The last sign of life of a watched peer.
+    /// The last sign of life of a watched peer, on which motion may depend. Where it echoes stamps, a message that was
+    /// held up is none.
     pub fn last_sign(&self, id: JausId) -> Option<Instant> {
-        self.peers.get(&id).map(|peer| peer.alive)
+        let peer = self.peers.get(&id)?;
+        Some(peer.freshness.last_sign().unwrap_or(peer.alive))
     }
 
     /// Whether a peer has shown life within [`DEATH`](Self::DEATH).
     pub fn is_alive(&self, now: Instant, id: JausId) -> bool {
-        self.last_sign(id)
-            .is_some_and(|alive| now.saturating_duration_since(alive) < Self::DEATH)
+        let peer = self.peers.get(&id);
+        peer.is_some_and(|peer| now.saturating_duration_since(peer.alive) < Self::DEATH)
     }
 
     /// Whether a peer was probed until [`DEATH`](Self::DEATH) and has never answered a probe, so
@@ -263,7 +298,10 @@ impl Life {
                         (peer.asked, peer.is_doubtful) = (Some(now), false);
                         peer.unanswered = peer.unanswered.saturating_add(1);
                         match peer.watch.incarnation() {
-                            Some(_) => out.send_with(id, Priority::High, &self.own.query()),
+                            Some(_) => {
+                                let stamp = peer.freshness.stamp(now);
+                                out.send_with(id, Priority::High, &self.own.query(stamp));
+                            }
                             None => out.send_with(id, Priority::High, &QueryHeartbeatPulse {}),
                         }
                     } else if is_due && has_budget {
@@ -273,7 +311,8 @@ impl Life {
                             .saturating_add(u32::from(silence >= rank.patience()));
                         (peer.asked, peer.is_doubtful) = (Some(now), false);
                         if peer.watch.incarnation().is_some() {
-                            out.send_acknowledged(id, Priority::High, &self.own.query());
+                            let stamp = peer.freshness.stamp(now);
+                            out.send_acknowledged(id, Priority::High, &self.own.query(stamp));
                         } else {
                             out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
                         }
@@ -332,7 +371,13 @@ impl Peer {
             return None;
         }
         if self.watch.incarnation().is_some() {
-            return Some(self.asked.map_or(now, |asked| asked + Life::CHECK));
+            let age = self.freshness.age(now);
+            let is_doubtful = age.is_none_or(|age| age > Freshness::OLDEST / 2);
+            let pause = match is_doubtful {
+                true => Life::NUMBER_CHECK,
+                false => Life::CHECK,
+            };
+            return Some(self.asked.map_or(now, |asked| asked + pause));
         }
         // Whatever it sends has a number.
         let last = self.asked.map_or(self.alive, |asked| asked.max(self.alive));

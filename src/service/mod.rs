@@ -31,6 +31,7 @@ mod control;
 mod directory;
 mod discovery;
 mod events;
+mod freshness;
 mod functions;
 mod guard;
 mod handlers;

@@ -134,6 +134,46 @@ impl Mark {
     }
 }
 
+/// A number that was passed a while ago.
+#[derive(Debug)]
+pub(super) struct Settled {
+    after: Duration,
+    pub(super) number: Option<u16>,
+    /// What `number` will be next.
+    next: Option<Mark>,
+}
+
+impl Settled {
+    /// A number is settled when it was passed so long ago.
+    pub(super) const fn after(after: Duration) -> Self {
+        Self {
+            after,
+            number: None,
+            next: None,
+        }
+    }
+
+    /// Notes a number that was just sent. One behind those before is of another counter: that of another way to
+    /// the client.
+    pub(super) fn note(&mut self, mark: Mark) {
+        let Some(next) = self.next else {
+            self.next = Some(mark);
+            return;
+        };
+        if next.ahead(mark.number) >= 1 << 15 {
+            (self.number, self.next) = (None, Some(mark));
+        } else if mark.at.saturating_duration_since(next.at) >= self.after {
+            (self.number, self.next) = (Some(next.number), Some(mark));
+        }
+    }
+
+    /// Whether a number was sent before the settled one.
+    pub(super) fn is_behind(&self, number: u16) -> bool {
+        let lead = self.number.map_or(0, |it| it.wrapping_sub(number));
+        (1..1 << 15).contains(&lead)
+    }
+}
+
 impl Client {
     fn is_recent(&self, now: Instant) -> bool {
         let marks = self.setpoints.values().chain(&self.turn);
@@ -171,16 +211,19 @@ impl SendOrder {
             *client = Client::default();
         } else if lead > 0 {
             client.stray = (lead > REACH).then_some(mark);
-            self.refused += 1;
-            tracing::debug!(
-                source = %message.source, ?series, number, lead,
-                "setpoint refused: its sender has superseded it"
-            );
+            self.refuse(message, "its sender has superseded it");
             return false;
         }
         client.stray = None;
         client.setpoints.extend(series.map(|series| (series, mark)));
         true
+    }
+
+    /// Counts and traces a setpoint that must not move anything.
+    pub(super) fn refuse(&mut self, message: &Received, why: &str) {
+        self.refused += 1;
+        let (source, number) = (message.source, message.sequence);
+        tracing::debug!(%source, ?number, why, "setpoint refused");
     }
 
     /// Notes a stop or a start, which supersedes all setpoints before it.

@@ -22,7 +22,7 @@
 use std::time::Instant;
 
 use super::Incarnation;
-use super::order::{Mark, REACH, number_of};
+use super::order::{MEMORY, Mark, REACH, Settled, number_of};
 use crate::endpoint::Received;
 
 /// Whether one peer is still the one that it was.
@@ -80,15 +80,23 @@ impl RestartWatch {
 }
 
 /// The sequence numbers of one peer.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Counter {
     newest: Option<Mark>,
-    /// A number that was the newest at least [`MEMORY`](super::order::MEMORY) ago. What is behind it is not late.
-    settled: Option<u16>,
-    /// What `settled` will be next.
-    settling: Option<Mark>,
+    /// What is behind this is not late.
+    settled: Settled,
     /// The last number, if it may be of a new counter.
     fresh: Option<Mark>,
+}
+
+impl Default for Counter {
+    fn default() -> Self {
+        Self {
+            newest: None,
+            settled: Settled::after(MEMORY),
+            fresh: None,
+        }
+    }
 }
 
 impl Counter {
@@ -102,7 +110,7 @@ impl Counter {
             self.begin(mark);
             return Sameness::Same;
         };
-        self.settle(now, newest);
+        self.settled.note(Mark { at: now, ..newest });
         if is_next(newest, mark) {
             self.newest = Some(mark);
             self.fresh = None;
@@ -133,25 +141,17 @@ impl Counter {
     }
 
     /// Watches a counter from this number on.
-    const fn begin(&mut self, mark: Mark) {
+    fn begin(&mut self, mark: Mark) {
         *self = Self {
             newest: Some(mark),
-            settled: None,
-            settling: Some(mark),
-            fresh: None,
+            ..Self::default()
         };
-    }
-
-    fn settle(&mut self, now: Instant, newest: Mark) {
-        if let Some(settled) = self.settling.filter(|mark| !mark.is_recent(now)) {
-            self.settled = Some(settled.number);
-            self.settling = Some(newest);
-        }
+        self.settled.note(mark);
     }
 
     /// Whether a number may be one of those before the newest that were delayed.
     fn is_late(&self, newest: Mark, number: u16) -> bool {
-        match self.settled {
+        match self.settled.number {
             Some(settled) => number.wrapping_sub(settled) <= newest.number.wrapping_sub(settled),
             None => newest.number.wrapping_sub(number) < 1 << 15,
         }

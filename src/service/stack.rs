@@ -181,7 +181,7 @@ impl Stack {
         &self.standing
     }
 
-    /// How many setpoints were refused because their senders had superseded them.
+    /// How many setpoints were refused because their senders had superseded them, or because they were held up.
     #[must_use]
     pub const fn refused_setpoints(&self) -> u64 {
         self.order.refused()
@@ -230,6 +230,10 @@ impl Stack {
         self.end_overdue(now);
         // One that was given up is watched again as soon as it says anything: before it is answered.
         self.watch_setter(now, message.source);
+        if self.life.is_outdated(message) && !is_stop(&message.payload) {
+            self.order.refuse(message, "it was held up for too long");
+            return;
+        }
         self.life.hear(now, message);
         self.end_control_of_restarted(now, message);
         self.discovery.hear(now, message);

@@ -31,9 +31,9 @@ impl Introduction {
             Self::None => None,
             Self::Once(own) => {
                 *self = Self::None;
-                Some(own.query())
+                Some(own.query(0))
             }
-            Self::Always(own) => Some(own.query()),
+            Self::Always(own) => Some(own.query(0)),
         }
     }
 }

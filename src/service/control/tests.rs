@@ -1,6 +1,7 @@
 //! Tests of each transition of Access Control and Management on a whole component, in virtual time.
 
 mod emergencies;
+mod held_up;
 mod restarts;
 mod stopping;
 

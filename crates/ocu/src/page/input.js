@@ -102,7 +102,7 @@ export class Input {
   handlePads(pads, now) {
     const isNew = this.#gamepad.handlePads(pads, now);
     this.#settle();
-    if (isNew) this.#take(this.#gamepad, now, now);
+    if (isNew) this.#take(this.#gamepad, Math.min(this.#gamepad.timestamp, now), now);
   }
 
   /**

@@ -206,6 +206,11 @@ export class GamepadSource {
     return this.#index !== null;
   }
 
+  /** When the gamepad that is held has last sent something. */
+  get timestamp() {
+    return this.#timestamp;
+  }
+
   /** The gamepads as read at `time`. Returns whether there is a new act: a shoulder button was pressed. */
   handlePads(pads, time) {
     // What was pressed while the page stood still may be released since.

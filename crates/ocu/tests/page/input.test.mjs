@@ -257,6 +257,17 @@ test("a second finger does not drive, and ends what the first does", () => {
 
 // Gamepad
 
+test("a gamepad does not drive by what it has sent before the page learned of it", () => {
+  const bench = new Bench();
+  bench.pad({ isHeld: false });
+  bench.now += 3000;
+  bench.pad({ isHeld: false, timestamp: 0 });
+  bench.now += 20;
+  bench.pad({ timestamp: bench.now - 1500 });
+  assert.equal(bench.owner, null);
+  assert.match(bench.input.takeNotice(), /stood still for 1.5 s: press again/);
+});
+
 test("a gamepad drives while a shoulder button is held and its time stamp changes", () => {
   const bench = new Bench();
   bench.pad({ isHeld: false });

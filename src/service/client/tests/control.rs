@@ -476,20 +476,30 @@ fn a_client_tells_its_incarnation_before_it_requests_control() {
     let incarnation = bench.stack.incarnation().number();
     assert_eq!(
         bench.sent::<QueryIncarnation>(),
-        [QueryIncarnation { incarnation }]
+        [QueryIncarnation {
+            incarnation,
+            stamp: 0
+        }]
     );
 }
 
 #[test]
 fn control_is_lost_when_the_peer_is_another_incarnation() {
     let (mut bench, _) = held(4);
-    let number = |incarnation| ReportIncarnation { incarnation };
+    let number = |incarnation| ReportIncarnation {
+        incarnation,
+        stamp: 0,
+    };
     bench.hear(PEER, &number(7));
     bench.hear(OTHER, &number(8));
     bench.hear(PEER, &number(7));
     assert_eq!(news(&mut bench), []);
     // As a component does that has been granted a renewal as if it were a first request.
-    bench.hear(PEER, &QueryIncarnation { incarnation: 8 });
+    let restarted = QueryIncarnation {
+        incarnation: 8,
+        stamp: 0,
+    };
+    bench.hear(PEER, &restarted);
     assert_eq!(
         news(&mut bench),
         [ControlNews::Lost(ControlLost::Restarted)]

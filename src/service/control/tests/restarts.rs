@@ -14,17 +14,21 @@ use crate::service::{
 };
 
 /// The numbers of two starts of a client.
-const OLD: u64 = 7;
+pub(super) const OLD: u64 = 7;
 const NEW: u64 = 8;
 
 impl Rig {
     /// The client tells its incarnation, as it does before it requests control.
     fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
-        self.hear(client, &QueryIncarnation { incarnation })
+        let query = QueryIncarnation {
+            incarnation,
+            stamp: 0,
+        };
+        self.hear(client, &query)
     }
 
     /// Handles a message of `FIRST` with this number.
-    fn hear_numbered<M: Message>(&mut self, number: u16, message: &M) {
+    pub(super) fn hear_numbered<M: Message>(&mut self, number: u16, message: &M) {
         self.number = Some(number);
         self.hear(FIRST, message);
         self.number = None;
@@ -32,7 +36,12 @@ impl Rig {
 
     /// Lets the time pass; whenever the client is asked for its incarnation, it answers. Returns
     /// after which time it was asked.
-    fn answer_for(&mut self, time: Duration, client: JausId, incarnation: u64) -> Vec<Duration> {
+    pub(super) fn answer_for(
+        &mut self,
+        time: Duration,
+        client: JausId,
+        incarnation: u64,
+    ) -> Vec<Duration> {
         let (start, end) = (self.now, self.now + time);
         let mut asked = Vec::new();
         while let Some(wake) = self.stack.poll_timeout().filter(|wake| *wake <= end) {
@@ -40,9 +49,10 @@ impl Rig {
             self.stack.handle_timeout(self.now);
             let sent: Vec<Outgoing> = std::iter::from_fn(|| self.stack.poll_transmit()).collect();
             for message in sent.iter().filter(|it| it.destination == client) {
-                if QueryIncarnation::decode(&message.payload).is_ok() {
+                if let Ok(query) = QueryIncarnation::decode(&message.payload) {
                     asked.push(self.now - start);
-                    self.hear(client, &ReportIncarnation { incarnation });
+                    let stamp = query.stamp;
+                    self.hear(client, &ReportIncarnation { incarnation, stamp });
                 }
             }
         }
@@ -145,6 +155,7 @@ fn a_component_tells_its_own_incarnation_and_always_the_same() {
         FIRST,
         &ReportIncarnation {
             incarnation: rig.stack.incarnation().number(),
+            stamp: 0,
         },
     );
     for _ in 0..2 {
@@ -209,7 +220,11 @@ fn a_new_incarnation_whose_request_arrives_before_its_introduction_keeps_control
 #[test]
 fn a_new_incarnation_that_only_answers_is_told_that_its_control_has_ended() {
     let mut rig = Rig::driven();
-    let said = rig.hear(FIRST, &ReportIncarnation { incarnation: NEW });
+    let report = ReportIncarnation {
+        incarnation: NEW,
+        stamp: 0,
+    };
+    let said = rig.hear(FIRST, &report);
     assert_eq!(said, [rejected(FIRST, Rejection::CONTROL_RELEASED)]);
 }
 
@@ -260,7 +275,7 @@ fn a_client_that_offers_the_service_and_has_not_told_its_incarnation_is_asked_fo
 }
 
 /// A ready component of `FIRST` that counts its commands.
-fn moving() -> (Rig, Arc<AtomicU32>) {
+pub(super) fn moving() -> (Rig, Arc<AtomicU32>) {
     let (rig, commands) = idle();
     (rig.drive(), commands)
 }
@@ -316,6 +331,7 @@ fn a_new_incarnation_counts_its_messages_anew() {
     rig.introduce(FIRST, NEW);
     rig.request(FIRST, 100);
     rig.hear(FIRST, &Resume);
+    rig.answer_for(Duration::from_millis(300), FIRST, NEW);
     rig.hear_numbered(1, &command);
     assert_eq!(commands.load(Relaxed), 2);
 }
