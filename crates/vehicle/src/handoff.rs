@@ -80,7 +80,10 @@ impl Handoff {
         context: &mut Context<'_>,
     ) {
         let Standing {
-            state, controller, ..
+            state,
+            controller,
+            least_authority,
+            ..
         } = *context.standing();
         let known = self.requests.iter().position(|it| it.client == client);
         let id = match known {
@@ -96,7 +99,7 @@ impl Handoff {
         };
         let answer = if !matches!(state, State::Ready | State::Standby) {
             Answer::NOT_AVAILABLE
-        } else if request.content.authority_code == 0 {
+        } else if request.content.authority_code < least_authority.max(1) {
             Answer::INSUFFICIENT_AUTHORITY
         } else if controller.is_none_or(|it| it.id == client) {
             context.hand_over(request.as_controller());

@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use jaus::messages::core::{ReleaseControl, RequestControl, Resume, SetEmergency};
-use jaus::service::{Discovery, Kind, Management, Profile, Scope, Stack, Timing};
+use jaus::service::{AccessControl, Discovery, Kind, Management, Profile, Scope, Stack, Timing};
 use jaus::wire::{Broadcast, Priority};
 
 use super::*;
@@ -22,11 +22,15 @@ struct Rover {
 
 impl Rover {
     fn new() -> Self {
+        Self::with(Management::new())
+    }
+
+    fn with(management: Management) -> Self {
         let profile = Profile::new(Kind::Vehicle, "Rover");
         let discovery = Discovery::new(ROVER, profile, Scope::Nobody, Timing::default(), 1);
         let stack = Stack::new(discovery, vec![Box::new(Handoff::new())]);
         let mut rover = Self {
-            stack: stack.management(Management::new()),
+            stack: stack.management(management),
             now: Instant::now(),
             sent: Vec::new(),
         };
@@ -192,6 +196,19 @@ fn control_that_is_released_or_free_goes_to_the_client_that_waits() {
     rover.hear(THIRD, &request(1));
     assert_eq!(rover.answer_to(THIRD), Some(Answer::GRANTED));
     assert_eq!(rover.stands(), (State::Standby, Some(THIRD)));
+}
+
+#[test]
+fn who_has_too_little_authority_for_the_component_is_not_told_that_it_has_control() {
+    let access = AccessControl::new().authority(50);
+    let mut rover = Rover::with(Management::new().access_control(access));
+    rover.hear(HOLDER, &ReleaseControl {});
+    rover.hear(OTHER, &request(49));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::INSUFFICIENT_AUTHORITY));
+    assert_eq!(rover.stands(), (State::Standby, None));
+    rover.hear(OTHER, &request(50));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::GRANTED));
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
 }
 
 #[test]
