@@ -238,6 +238,26 @@ fn a_key_has_a_bounded_number_of_programs_and_a_silent_one_gives_way() {
 }
 
 #[test]
+fn who_has_stolen_a_key_and_runs_many_programs_keeps_its_owner_not_out() {
+    let (mut network, [_, rover], [_, operator]) = vehicle_and_operator();
+    kill(&mut network, 1);
+    network.run(10 * SECOND);
+    for program in 0..MOST_INSTANCES as u16 {
+        let thief = network.add(&operator, &rover, &[address(1)]);
+        network.hosts[thief].address.set_ip(address(99).ip());
+        network.hosts[thief].address.set_port(4000 + program);
+    }
+    network.run(5 * SECOND);
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+    let owner = network.add(&operator, &rover, &[address(1)]);
+    network.run(5 * SECOND);
+    assert!(network.session(owner).is_some());
+    network.run(60 * SECOND);
+    assert!(network.session(owner).is_some());
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+}
+
+#[test]
 fn a_hello_is_no_key_to_the_session_of_another_program() {
     let (mut network, rover, operator) = vehicle_and_programs(1);
     let before = sessions(&network, 0);
