@@ -1,6 +1,7 @@
 //! Requests for control at a component with Management, in virtual time.
 
 use bytes::Bytes;
+use jaus::endpoint::{LinkId, Path, Remote, SessionId};
 use jaus::messages::core::{ReleaseControl, RequestControl, Resume, SetEmergency};
 use jaus::service::{AccessControl, Discovery, Kind, Management, Profile, Scope, Stack, Timing};
 use jaus::wire::{Broadcast, Priority};
@@ -46,6 +47,10 @@ impl Rover {
     }
 
     fn hear<M: Message>(&mut self, source: JausId, message: &M) {
+        self.hear_on(None, source, message);
+    }
+
+    fn hear_on<M: Message>(&mut self, path: Option<Path>, source: JausId, message: &M) {
         let received = Received {
             source,
             destination: ROVER,
@@ -54,7 +59,7 @@ impl Rover {
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
             sequence: None,
-            path: None,
+            path,
         };
         self.sent.clear();
         self.stack.handle_message(self.now, &received);
@@ -236,6 +241,43 @@ fn a_takeover_leaves_requests_to_the_new_client_in_control() {
     assert_eq!(rover.stands().1, Some(THIRD));
     rover.hear(THIRD, &decide(1, Decision::GRANTED));
     assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+}
+
+/// The path of a session with this number.
+fn session(number: u64) -> Option<Path> {
+    let peer = Remote::Session(SessionId(number));
+    Some(Path {
+        link: LinkId(1),
+        peer,
+    })
+}
+
+#[test]
+fn neither_the_ids_of_a_session_nor_the_sessions_of_a_subsystem_take_all_places() {
+    for is_one_session in [true, false] {
+        let mut rover = Rover::new();
+        for number in 0..10_u8 {
+            let path = session(if is_one_session { 1 } else { number.into() });
+            let client = JausId::new(50, 1, number + 1);
+            rover.hear_on(path, client, &request(1));
+            let is_full = usize::from(number) >= Handoff::MOST;
+            let expected = match is_full {
+                true => Answer::NOT_AVAILABLE,
+                false => Answer::QUEUED,
+            };
+            assert_eq!(rover.answer_to(client), Some(expected));
+        }
+        for (number, colleague) in [(20, OTHER), (21, THIRD)] {
+            rover.hear_on(session(number), colleague, &request(100));
+            assert_eq!(rover.answer_to(colleague), Some(Answer::QUEUED));
+        }
+        let told = rover.told(HOLDER).unwrap();
+        let expected = [50, 50, 50, 50, 50, 50, 43, 44];
+        assert_eq!(told, expected, "the newest have given way");
+        rover.hear_on(session(1), JausId::new(50, 1, 1), &request(1));
+        rover.hear_on(session(20), OTHER, &request(100));
+        assert_eq!(rover.answer_to(OTHER), Some(Answer::QUEUED));
+    }
 }
 
 #[test]
