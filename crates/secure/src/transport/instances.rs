@@ -17,7 +17,7 @@ use jaus::address::JausId;
 use jaus::endpoint::SessionId;
 use jaus::rights::{Permission, Table};
 use jaus::wire::{DataControl, Frame};
-use jaus_limits::{first_of_largest, quota_address};
+use jaus_limits::{last_of_crowd, quota_address};
 
 use super::record::Act;
 use super::session::Session;
@@ -107,7 +107,7 @@ pub(super) fn only_stops(frame: &Frame, table: &Table) -> bool {
 
 impl Transport {
     /// Ends a session with this key if there is no place for a new one from this address: a silent one, or
-    /// one of another address that has most of them, so that who has stolen the key keeps its owner not out.
+    /// one of another address that has most of them, so that a thief of the key does not keep its owner out.
     /// Returns whether there is a place.
     pub(super) fn has_place_for(
         &mut self,
@@ -145,15 +145,12 @@ impl Transport {
         }
     }
 
-    /// The oldest session with this key of the address that has most of them, if that are several, and of
-    /// another host.
+    /// The newest session with this key of the address that has most of them, unless the newcomer's has as many.
     fn crowding(&self, key: PublicKey, newcomer: SocketAddr) -> Option<SessionId> {
         let host = |address: SocketAddr| quota_address(address.ip());
         let sessions = self.with_key(key).map(|(id, it)| (id, host(it.address())));
         let sessions: Vec<_> = sessions.collect();
-        let (id, crowd) = sessions[first_of_largest(&sessions, |it| it.1)?];
-        let several = sessions.iter().filter(|it| it.1 == crowd).count() > 1;
-        (several && crowd != host(newcomer)).then_some(id)
+        last_of_crowd(&sessions, &host(newcomer), |it| it.1).map(|at| sessions[at].0)
     }
 
     /// Handles the hello of a peer.
