@@ -101,6 +101,15 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether another program has the port at present, so that a later attempt may succeed.
+    #[must_use]
+    pub const fn is_taken(&self) -> bool {
+        matches!(
+            self,
+            Self::PortTaken { .. } | Self::GroupTaken { .. } | Self::ListenerTaken(_)
+        )
+    }
+
     /// Maps an error of the operating system.
     pub(super) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
         |source| Self::Io(doing.into(), source)

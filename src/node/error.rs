@@ -50,6 +50,18 @@ pub enum StartError {
     NoRuntime,
 }
 
+impl StartError {
+    /// Whether another program has a port or socket of the node at present, so that a later start may succeed.
+    #[must_use]
+    pub const fn is_taken(&self) -> bool {
+        match self {
+            Self::Link(error) => error.is_taken(),
+            Self::Local(error) => matches!(error, link::local::Error::Served(..)),
+            _ => false,
+        }
+    }
+}
+
 /// Why a message was not sent. No part of it was.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

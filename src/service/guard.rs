@@ -449,6 +449,7 @@ mod tests {
             state,
             exclusive: true,
             controller: Some(Controller { id, authority: 1 }),
+            ..Standing::default()
         };
         let released = |state| Standing {
             controller: None,

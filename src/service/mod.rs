@@ -95,6 +95,7 @@ pub use outbox::Outbox;
 pub use publication::{NotPublished, Publication};
 pub use safety::UnsafeService;
 pub use sample_age::{SampleAge, SampleStamp};
+pub use share::Share;
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
 pub use time::{Time, TimeOfDay};

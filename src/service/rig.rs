@@ -70,6 +70,7 @@ impl Rig {
                 state,
                 exclusive: true,
                 controller,
+                ..Standing::default()
             },
         );
         for service in &mut self.services {

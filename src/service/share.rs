@@ -4,9 +4,10 @@ use std::net::IpAddr;
 
 use crate::endpoint::{LinkId, Received, Remote, SessionId, quota_address};
 
-/// The origin of an entry.
+/// The origin of an entry, such as a request that waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Share {
+#[non_exhaustive]
+pub enum Share {
     /// A component of the same node.
     Here,
     /// A network address, or a network that one host may own entirely.
@@ -19,7 +20,8 @@ pub(super) enum Share {
 
 impl Share {
     /// The origin of a message.
-    pub(super) fn of(received: &Received) -> Self {
+    #[must_use]
+    pub fn of(received: &Received) -> Self {
         let Some(path) = received.path else {
             return Self::Here;
         };

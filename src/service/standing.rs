@@ -78,6 +78,8 @@ pub struct Standing {
     pub state: State,
     /// Whether commands need control, that is, whether the component offers Access Control.
     pub exclusive: bool,
+    /// Clients with a lower authority do not get control.
+    pub least_authority: u8,
     /// The client in control, if any.
     pub controller: Option<Controller>,
 }
@@ -182,6 +184,7 @@ mod tests {
             state,
             exclusive: true,
             controller: Some(controller),
+            ..Standing::default()
         }
     }
 

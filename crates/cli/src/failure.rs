@@ -6,6 +6,8 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
+use jaus::node::StartError;
+
 /// Result of a completed run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
@@ -40,9 +42,11 @@ impl From<Outcome> for ExitCode {
 pub enum Failure {
     /// Standard output is closed; no message is printed. Exit status 0.
     OutputClosed,
-    /// The run was not possible: the mistake and its remedy. Exit status 2.
+    /// The run was not possible: the mistake and its remedy. Exit status 2, after which services are not started
+    /// again.
     Message(String),
-    /// The result is negative, such as control that is not granted. Exit status 1.
+    /// The result is negative, such as control that is not granted, or a port that another program has at
+    /// present. Exit status 1.
     Negative(String),
 }
 
@@ -68,7 +72,7 @@ impl Failure {
 
     /// An error of the library, with its causes. Its messages are written for users, and many name
     /// their cause themselves, which is not repeated then.
-    pub fn of(error: impl Error) -> Self {
+    pub fn of(error: impl Error + 'static) -> Self {
         let mut message = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
@@ -78,13 +82,29 @@ impl Failure {
             }
             source = cause.source();
         }
-        Self::Message(message)
+        Self::about(&error, message)
+    }
+
+    /// A sentence about an error, and the exit status that the error has.
+    pub fn about(error: &(dyn Error + 'static), message: String) -> Self {
+        match is_taken(error) {
+            true => Self::Negative(message),
+            false => Self::Message(message),
+        }
     }
 
     /// A file that cannot be opened or read.
     pub fn file(path: &Path, error: &io::Error) -> Self {
         Self::Message(format!("{}: {error}", path.display()))
     }
+}
+
+/// Whether another program has what is needed, such as a port. That passes, unlike a wrong setting.
+fn is_taken(error: &(dyn Error + 'static)) -> bool {
+    let io = error.downcast_ref::<io::Error>();
+    io.is_some_and(|it| it.kind() == io::ErrorKind::AddrInUse)
+        || error.downcast_ref().is_some_and(StartError::is_taken)
+        || error.source().is_some_and(is_taken)
 }
 
 impl fmt::Display for Failure {
@@ -101,7 +121,6 @@ impl Error for Failure {}
 #[cfg(test)]
 mod tests {
     use jaus::link;
-    use jaus::node::StartError;
 
     use super::*;
 
@@ -123,6 +142,18 @@ mod tests {
         let told = Failure::of(StartError::from(refused)).to_string();
         assert_eq!(told.matches("os error 92").count(), 1, "{told}");
         assert!(told.contains("--group off --peer"), "{told}");
+    }
+
+    #[test]
+    fn a_port_that_another_program_has_is_no_mistake_of_the_settings() {
+        let address = ([127, 0, 0, 1], 3794).into();
+        let taken = StartError::from(link::Error::ListenerTaken(address));
+        let in_use = io::Error::from(io::ErrorKind::AddrInUse);
+        for passing in [Failure::of(taken), Failure::of(in_use)] {
+            assert!(matches!(passing, Failure::Negative(_)), "{passing:?}");
+        }
+        let gone = StartError::from(link::Error::AddressGone([192, 0, 2, 1].into()));
+        assert!(matches!(Failure::of(gone), Failure::Message(_)));
     }
 
     #[test]

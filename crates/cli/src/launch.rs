@@ -11,10 +11,10 @@ use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 use super::failure::{Failure, Outcome};
 use super::logging::{self, LevelRequests, Logging};
 use super::metrics::{Metrics, MetricsFlags};
-use super::network::{self, Network};
+use super::network::Network;
 use super::runtime::RunFor;
 use super::systemd::Systemd;
-use super::{output, reference, runtime, settings};
+use super::{exposure, output, reference, runtime, settings};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
@@ -85,8 +85,8 @@ const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_zeno
 /// Runs a program: reads flags and settings, attaches to a node, runs the part until Ctrl-C or
 /// SIGTERM, and detaches.
 ///
-/// Exit status: 0 after a signal or Management's Shutdown; 1 it could not continue; 2 it could not
-/// start.
+/// Exit status: 0 after a signal or Management's Shutdown; 1 it could not continue, or another program has its
+/// port; 2 it could not start.
 #[must_use]
 pub fn launch<F: Ready>() -> ExitCode {
     if std::env::args_os().skip(1).eq([reference::ARGUMENT]) {
@@ -180,7 +180,7 @@ fn tell_place(id: JausId, node: Option<&Node>) {
     for link in node.links() {
         tracing::info!("{id} on {}, UDP {}", link.interface.name, link.local);
     }
-    network::tell_exposure(node);
+    exposure::tell(node);
 }
 
 /// Parses flags and settings file; help, version and mistakes end the process here.

@@ -9,6 +9,7 @@
 )]
 
 pub mod audit;
+pub mod exposure;
 pub mod failure;
 mod fence;
 pub mod folders;

@@ -430,51 +430,6 @@ pub const REMEDY: &str = "List components with `jaus discover`, choose the netwo
     --interface, or name a host that multicast does not reach with --peer; `jaus doctor` finds out \
     what is wrong";
 
-/// Says at the start of a node, once, if it has plain links to other hosts, and who may command by them.
-pub fn tell_exposure(node: &Node) {
-    let Some(on) = exposure(node) else {
-        return;
-    };
-    match node.config().access.grants.is_empty() {
-        true => tracing::warn!(
-            "plain JUDP on {on}: ANY HOST ON THESE NETWORKS MAY COMMAND this node, in any id. Name the \
-             network by --interface, say who may command by --grant or [access] grants \
-             (docs/hardening.md), or use secure links (docs/secure-links.md)"
-        ),
-        false => tracing::info!(
-            "plain JUDP on {on}: every host on these networks can read messages, and send them in any id \
-             that is not bound to an address; secure links prevent that (docs/security.md)"
-        ),
-    }
-}
-
-/// The plain links of a node to other hosts, or `None` if it has none.
-fn exposure(node: &Node) -> Option<String> {
-    let (config, links) = (node.config(), node.links());
-    let open = links.iter().filter(|it| !it.local.ip().is_loopback());
-    let mut on: Vec<_> = open.map(|it| it.interface.name.clone()).collect();
-    on.dedup();
-    // The network may come later than a service.
-    let may_come = match &config.interfaces {
-        Interfaces::Loopback => false,
-        Interfaces::Only(names) => links.is_empty() && !names.is_empty(),
-        Interfaces::All => on.is_empty(),
-    };
-    #[cfg(unix)]
-    let junior = config.junior.is_some();
-    #[cfg(not(unix))]
-    let junior = false;
-    match (junior, may_come) {
-        (true, _) => on.push("the interfaces of Junior".to_owned()),
-        (false, true) => on.push("interfaces that come up".to_owned()),
-        (false, false) => {}
-    }
-    let listening = node.tcp().and_then(|it| it.listening);
-    let listening = listening.filter(|it| !it.ip().is_loopback());
-    on.extend(listening.map(|it| format!("TCP {it}")));
-    (!on.is_empty()).then(|| on.join(", "))
-}
-
 /// Parses the id of a single component.
 pub fn one_component(text: &str) -> Result<JausId, String> {
     let id: JausId = text.parse().map_err(|error| format!("{error}"))?;

@@ -289,6 +289,9 @@ impl Secure {
             return TrustFile::load_controlled(&path, &approvers).map_err(Failure::of);
         }
         if self.uses_certificates() {
+            if self.files.trusted_keys.is_some() && !path.exists() {
+                tracing::warn!(file = %path.display(), "missing, so no line narrows a certificate");
+            }
             return TrustFile::load_optional(&path).map_err(Failure::of);
         }
         TrustFile::load(&path)

@@ -222,6 +222,25 @@ impl Trust {
         })
     }
 
+    /// Whether an id is rather that of another trusted key than of this peer: of several keys that may use it, it
+    /// belongs to those with the narrowest ids.
+    #[must_use]
+    pub fn is_others(&self, peer: &Peer, id: JausId) -> bool {
+        let narrowest = |of: &Peer| {
+            let ids = of.ids.iter().filter(|ids| ids.matches(id));
+            ids.map(|ids| wildcards(*ids)).min()
+        };
+        let others = self.peers.iter().filter(|it| it.key != peer.key);
+        let others = others.filter_map(narrowest).min();
+        matches!((narrowest(peer), others), (Some(own), Some(others)) if others < own)
+    }
+
+    /// The other peers, by their names, that may use ids of this one.
+    pub fn sharing<'t>(&'t self, peer: &'t Peer) -> impl Iterator<Item = &'t Peer> {
+        let others = self.peers.iter().filter(|it| it.name != peer.name);
+        others.filter(|it| !common(&it.ids, &peer.ids).is_empty())
+    }
+
     /// The peer with this key.
     #[must_use]
     pub fn find(&self, key: PublicKey) -> Option<&Peer> {
@@ -259,6 +278,16 @@ impl Trust {
     pub fn grants(&self) -> &[Grant] {
         &self.grants
     }
+}
+
+/// How many fields of ids are wildcards.
+fn wildcards(ids: JausId) -> usize {
+    let fields = [
+        ids.subsystem() == JausId::ANY_SUBSYSTEM,
+        ids.node() == JausId::ANY_NODE,
+        ids.component() == JausId::ANY_COMPONENT,
+    ];
+    fields.into_iter().filter(|is_any| *is_any).count()
 }
 
 /// The ids that match an id of both lists.

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::endpoint::Received;
-use jaus::service::{Context, Controller, Handled, Service, Standing, State, code_of};
+use jaus::service::{Context, Controller, Handled, Service, Share, Standing, State, code_of};
+use jaus_limits::last_of_crowd;
 
 use crate::messages::handoff::confirm_handoff_request::ResponseCode as Answer;
 use crate::messages::handoff::confirm_release_control::ResponseCode as Decision;
@@ -35,6 +36,7 @@ pub struct Handoff {
 struct Request {
     id: u8,
     client: JausId,
+    origin: Share,
     content: RequestHandoff,
     since: Instant,
     renewed: Instant,
@@ -59,7 +61,8 @@ impl Handoff {
     pub const ANSWER: u8 = 30;
     /// A request that its client does not repeat lapses after this time, in seconds.
     pub const LAPSE: u8 = 5;
-    /// Limit of undecided requests. Further ones are refused.
+    /// Limit of undecided requests. Further ones are refused, or displace one of an origin that has more than its
+    /// share.
     const MOST: usize = 8;
     /// The client in control is told of the requests at this interval, because a message may be
     /// lost.
@@ -75,12 +78,15 @@ impl Handoff {
     fn request(
         &mut self,
         now: Instant,
-        client: JausId,
+        (client, origin): (JausId, Share),
         content: RequestHandoff,
         context: &mut Context<'_>,
     ) {
         let Standing {
-            state, controller, ..
+            state,
+            controller,
+            least_authority,
+            ..
         } = *context.standing();
         let known = self.requests.iter().position(|it| it.client == client);
         let id = match known {
@@ -90,13 +96,14 @@ impl Handoff {
         let request = Request {
             id,
             client,
+            origin,
             content,
             since: known.map_or(now, |at| self.requests[at].since),
             renewed: now,
         };
         let answer = if !matches!(state, State::Ready | State::Standby) {
             Answer::NOT_AVAILABLE
-        } else if request.content.authority_code == 0 {
+        } else if request.content.authority_code < least_authority.max(1) {
             Answer::INSUFFICIENT_AUTHORITY
         } else if controller.is_none_or(|it| it.id == client) {
             context.hand_over(request.as_controller());
@@ -104,7 +111,7 @@ impl Handoff {
         } else if let Some(at) = known {
             self.requests[at] = request;
             Answer::QUEUED
-        } else if self.requests.len() < Self::MOST {
+        } else if self.has_place_for(&request, context) {
             tracing::info!(id = %context.id(), %client, "control is requested");
             self.requests.push(request);
             self.notify_controller(now, context);
@@ -116,6 +123,25 @@ impl Handoff {
             self.requests.retain(|it| it.client != client);
         }
         confirm(client, id, answer, context);
+    }
+
+    /// Whether there is a place for a request. In a full list another one gives way, of the origin, or else of the
+    /// subsystem, that has most of them: one origin may use many ids, and one key may have many sessions.
+    fn has_place_for(&mut self, newcomer: &Request, context: &mut Context<'_>) -> bool {
+        if self.requests.len() < Self::MOST {
+            return true;
+        }
+        let origin = |it: &Request| it.origin;
+        let subsystem = |it: &Request| it.client.subsystem();
+        let crowding = last_of_crowd(&self.requests, &origin(newcomer), origin)
+            .or_else(|| last_of_crowd(&self.requests, &subsystem(newcomer), subsystem));
+        let Some(at) = crowding else {
+            return false;
+        };
+        let displaced = self.requests.remove(at);
+        let answer = Answer::NOT_AVAILABLE;
+        confirm(displaced.client, displaced.id, answer, context);
+        true
     }
 
     /// A number that no undecided request has.
@@ -213,7 +239,7 @@ impl Service for Handoff {
         match code_of(octets) {
             Some(RequestHandoff::CODE) => {
                 if let Ok(content) = RequestHandoff::decode(octets) {
-                    self.request(now, from, content, context);
+                    self.request(now, (from, Share::of(message)), content, context);
                 }
             }
             Some(RemoveHandoffRequest::CODE) => {

@@ -102,7 +102,8 @@ impl Control {
     /// Gives control to another client, in standby.
     pub(in crate::service) fn hand_over(&mut self, now: Instant, to: Controller, out: &mut Outbox) {
         let is_possible = matches!(self.standing.state, State::Ready | State::Standby)
-            && self.access.is_some_and(|it| to.authority >= it.authority);
+            && self.access.is_some()
+            && to.authority >= self.standing.least_authority;
         if !is_possible || self.is_controller(to.id) {
             return;
         }

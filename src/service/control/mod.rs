@@ -184,6 +184,7 @@ impl Control {
             access: Some(settings),
             standing: Standing {
                 exclusive: true,
+                least_authority: settings.authority,
                 ..Standing::default()
             },
             ..Self::default()

@@ -88,9 +88,9 @@ impl Metrics {
         };
         let opened = TcpListener::bind(address).await;
         let listener = opened.map_err(|error| {
-            Failure::new(format!(
-                "no metrics at {address}: {error}; choose another address with --metrics"
-            ))
+            let message =
+                format!("no metrics at {address}: {error}; choose another address with --metrics");
+            Failure::about(&error, message)
         })?;
         let address = listener.local_addr().map_err(Failure::of)?;
         tracing::info!("metrics at http://{address}/metrics");

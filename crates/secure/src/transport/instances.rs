@@ -10,12 +10,14 @@
 //! restarted, its session ends and the id is free.
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::endpoint::SessionId;
 use jaus::rights::{Permission, Table};
 use jaus::wire::{DataControl, Frame};
+use jaus_limits::{last_of_crowd, quota_address};
 
 use super::record::Act;
 use super::session::Session;
@@ -104,9 +106,15 @@ pub(super) fn only_stops(frame: &Frame, table: &Table) -> bool {
 }
 
 impl Transport {
-    /// Ends a silent session with this key if there is no place for a new one; returns whether there is
-    /// a place.
-    pub(super) fn has_place_for(&mut self, now: Instant, key: PublicKey) -> bool {
+    /// Ends a session with this key if there is no place for a new one from this address: a silent one, or
+    /// one of another address that has most of them, so that a thief of the key does not keep its owner out.
+    /// Returns whether there is a place.
+    pub(super) fn has_place_for(
+        &mut self,
+        now: Instant,
+        key: PublicKey,
+        address: SocketAddr,
+    ) -> bool {
         let of_key: Vec<_> = self
             .with_key(key)
             .map(|(id, it)| (it.heard_at, id, SILENCE.max(it.answer_time())))
@@ -117,8 +125,9 @@ impl Transport {
         let longest_silent = of_key.into_iter().min();
         let is_silent =
             |&(at, _, time): &(Option<Instant>, _, _)| at.is_none_or(|at| at + time <= now);
-        match longest_silent.filter(is_silent) {
-            Some((_, id, _)) => {
+        let silent = longest_silent.filter(is_silent).map(|(_, id, _)| id);
+        match silent.or_else(|| self.crowding(key, address)) {
+            Some(id) => {
                 self.end(now, id, code::DUPLICATE, "too many programs with this key");
                 true
             }
@@ -134,6 +143,14 @@ impl Transport {
                 false
             }
         }
+    }
+
+    /// The newest session with this key of the address that has most of them, unless the newcomer's has as many.
+    fn crowding(&self, key: PublicKey, newcomer: SocketAddr) -> Option<SessionId> {
+        let host = |address: SocketAddr| quota_address(address.ip());
+        let sessions = self.with_key(key).map(|(id, it)| (id, host(it.address())));
+        let sessions: Vec<_> = sessions.collect();
+        last_of_crowd(&sessions, &host(newcomer), |it| it.1).map(|at| sessions[at].0)
     }
 
     /// Handles the hello of a peer.

@@ -354,7 +354,8 @@ impl Transport {
             }
         };
         let key = identified.peer.key;
-        if session.dial.is_none() && !self.has_place_for(now, key) {
+        let address = session.address();
+        if session.dial.is_none() && !self.has_place_for(now, key, address) {
             self.counters.add(Counter::TooManyInstances);
             self.end(now, id, code::BUSY, "too many programs with this key");
             return;
@@ -362,7 +363,7 @@ impl Transport {
         let Some(session) = self.sessions.get_mut(&id) else {
             return;
         };
-        let (peer, address) = (identified.peer, session.address());
+        let peer = identified.peer;
         tracing::info!(peer = peer.name, %address, "secure session established");
         session.peer = Some(peer);
         session.valid_until = identified.valid_until;

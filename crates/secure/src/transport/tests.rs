@@ -263,6 +263,16 @@ fn sessions(network: &Network, host: usize) -> Vec<SessionId> {
     sessions.map(|it| it.session).collect()
 }
 
+/// Checks that the hosts can send each other datagrams.
+fn exchange_both_ways(network: &mut Network) {
+    let (report, command) = (judp("101.1.33", 20), judp("60.1.1", 900));
+    network.send(0, Priority::Standard, &report);
+    network.send(1, Priority::High, &command);
+    network.run(SECOND);
+    assert_eq!(network.hosts[1].received, [report]);
+    assert_eq!(network.hosts[0].received, [command]);
+}
+
 #[test]
 fn nodes_that_trust_each_other_exchange_datagrams_both_ways() {
     let (mut network, ..) = vehicle_and_operator();
@@ -271,12 +281,7 @@ fn nodes_that_trust_each_other_exchange_datagrams_both_ways() {
     assert_eq!(at_operator.peer.name, "rover");
     assert!(at_operator.dialed && !at_vehicle.dialed);
 
-    let (report, command) = (judp("101.1.33", 20), judp("60.1.1", 900));
-    network.send(0, Priority::Standard, &report);
-    network.send(1, Priority::High, &command);
-    network.run(SECOND);
-    assert_eq!(network.hosts[1].received, [report]);
-    assert_eq!(network.hosts[0].received, [command]);
+    exchange_both_ways(&mut network);
 }
 
 #[test]

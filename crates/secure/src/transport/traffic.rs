@@ -209,7 +209,8 @@ impl Transport {
     fn check(&mut self, now: Instant, id: SessionId, frame: &Frame) -> Result<Admitted, Refused> {
         let (table, source) = (&self.table, frame.source);
         let peer = self.sessions.get(&id).and_then(Session::established);
-        let peer = peer.filter(|it| it.speaks_for(source));
+        let trust = self.credentials.trust();
+        let peer = peer.filter(|it| it.speaks_for(source) && !trust.is_others(it, source));
         let peer = peer.ok_or(Refused::Unaccepted(Unaccepted::Source))?;
         let other = self.other_user(now, id, peer.key, source);
         // A stop does not fail because two programs use one id.

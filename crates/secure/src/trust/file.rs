@@ -3,6 +3,7 @@
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use jaus::address::JausId;
 use jaus::rights::{RuleError, Table};
@@ -53,17 +54,24 @@ impl TrustFile {
         Followed::load(files, read).map(Self)
     }
 
-    /// Reads a trust file, which may be missing as long as there is nothing to say.
+    /// Reads a trust file, which may be missing as long as there is nothing to say: one that was there and
+    /// vanishes may have narrowed somebody, and is unusable.
     ///
     /// # Errors
     /// As [`load`](Self::load).
     pub fn load_optional(path: &Path) -> Result<Self, TrustError> {
-        let owned = path.to_owned();
+        let (owned, was_there) = (path.to_owned(), AtomicBool::new(false));
         let read = move || match read(&owned) {
-            Err(TrustError::File { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+            Err(TrustError::File { source, .. })
+                if source.kind() == io::ErrorKind::NotFound
+                    && !was_there.load(Ordering::Relaxed) =>
+            {
                 Ok(Trust::default())
             }
-            other => other,
+            other => {
+                was_there.store(true, Ordering::Relaxed);
+                other
+            }
         };
         Followed::load(vec![path.to_owned()], read).map(Self)
     }
@@ -114,6 +122,11 @@ impl TrustFile {
     /// As [`Trust::verify`].
     pub fn verify(&self, table: &Table) -> Result<(), (String, RuleError)> {
         self.0.get().verify(table)
+    }
+
+    /// Whether an id is rather that of another key: see [`Trust::is_others`].
+    pub(crate) fn is_others(&self, peer: &Peer, id: JausId) -> bool {
+        self.0.get().is_others(peer, id)
     }
 
     /// The number of trusted keys.
@@ -189,6 +202,23 @@ mod tests {
         fs::write(&path, "").unwrap();
         file.reload().unwrap();
         assert!(file.find(key(1)).is_none());
+        assert_eq!(file.fault(), None);
+    }
+
+    #[test]
+    fn a_file_that_narrows_certificates_may_be_missing_and_may_not_vanish() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trusted_keys");
+        let file = TrustFile::load_optional(&path).unwrap();
+        file.reload().unwrap();
+        assert_eq!(file.fault(), None);
+        fs::write(&path, "viewer certificate 61.255.255 except=SetEmergency\n").unwrap();
+        file.reload().unwrap();
+        fs::remove_file(&path).unwrap();
+        assert!(file.reload().is_err());
+        assert!(file.fault().is_some(), "new sessions are refused");
+        fs::write(&path, "").unwrap();
+        file.reload().unwrap();
         assert_eq!(file.fault(), None);
     }
 

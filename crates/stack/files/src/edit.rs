@@ -5,13 +5,15 @@ use std::path::Path;
 
 use crate::draft::replace;
 use crate::lock::FileLock;
-use crate::readers::{Readers, read_text};
+use crate::readers::{Owners, Readers, read_text_from};
 
 /// Changes the text of a file while no other program does; a missing file is an empty text. `change`
-/// returns the new text, or `None` to leave the file. Returns whether the file was replaced.
+/// returns the new text, or `None` to leave the file. Returns whether the file was replaced. Root may change the
+/// file of any user, who keeps it.
 ///
 /// # Errors
-/// Those of `change`, and those of [`FileLock::of`], [`read_text`] and [`replace`], through `failed`.
+/// Those of `change`, and those of [`FileLock::of`], [`read_text`](crate::read_text) but for the owner, and
+/// [`replace`], through `failed`.
 pub fn edit<E>(
     path: &Path,
     readers: Readers,
@@ -20,7 +22,7 @@ pub fn edit<E>(
     change: impl FnOnce(&str) -> Result<Option<String>, E>,
 ) -> Result<bool, E> {
     let _alone = FileLock::of(path).map_err(&failed)?;
-    let text = match read_text(path, readers, longest) {
+    let text = match read_text_from(path, readers, longest, Owners::Any) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
         text => text.map_err(&failed)?,
     };

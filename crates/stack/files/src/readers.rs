@@ -26,14 +26,28 @@ impl Readers {
     }
 }
 
-/// Reads a file of at most `longest` octets that only `readers` can read and only its owner can change.
+/// Whose files may be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Owners {
+    /// Those of root and of this process's user, because the process does what they say.
+    Own,
+    /// Those of every user: the file is changed for its owner, who keeps it.
+    Any,
+}
+
+/// Reads a file of at most `longest` octets that only `readers` can read, and that nobody but root and the
+/// user of this process can change.
 ///
 /// # Errors
 /// If the file cannot be read or is longer; [`io::ErrorKind::PermissionDenied`] if other users of the host
-/// can read it, change it, or replace it because they can write its folder.
+/// can read it, change it, or replace it because its folder is theirs or they can write it.
 pub fn read(path: &Path, readers: Readers, longest: u64) -> io::Result<Vec<u8>> {
+    read_from(path, readers, longest, Owners::Own)
+}
+
+fn read_from(path: &Path, readers: Readers, longest: u64, owners: Owners) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
-    check(path, &file, readers)?;
+    check(path, &file, readers, owners)?;
     // As large as needed, for growth would leave copies of a secret in memory. A pipe, such as
     // `<(pass show token)` of a shell, has no length beforehand.
     let length = file.metadata()?.len().min(longest) + 1;
@@ -51,17 +65,26 @@ pub fn read(path: &Path, readers: Readers, longest: u64) -> io::Result<Vec<u8>> 
 /// # Errors
 /// As [`read`]; [`io::ErrorKind::InvalidData`] if it is not UTF-8.
 pub fn read_text(path: &Path, readers: Readers, longest: u64) -> io::Result<String> {
-    String::from_utf8(read(path, readers, longest)?)
+    read_text_from(path, readers, longest, Owners::Own)
+}
+
+pub(crate) fn read_text_from(
+    path: &Path,
+    readers: Readers,
+    longest: u64,
+    owners: Owners,
+) -> io::Result<String> {
+    String::from_utf8(read_from(path, readers, longest, owners)?)
         .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
 }
 
 /// Checks the open file, so that what is read is what was checked.
 #[cfg(unix)]
-fn check(path: &Path, file: &File, readers: Readers) -> io::Result<()> {
+fn check(path: &Path, file: &File, readers: Readers, owners: Owners) -> io::Result<()> {
     use std::os::unix::fs::MetadataExt as _;
 
-    let denied = |text: String| Err(io::Error::new(io::ErrorKind::PermissionDenied, text));
-    let mode = file.metadata()?.mode() & 0o777;
+    let found = file.metadata()?;
+    let mode = found.mode() & 0o777;
     let excess = mode & 0o066 & !readers.mode();
     if excess & 0o004 == 0 && is_credential(path, std::env::var_os("CREDENTIALS_DIRECTORY")) {
         return Ok(());
@@ -84,21 +107,50 @@ fn check(path: &Path, file: &File, readers: Readers) -> io::Result<()> {
              {narrowed} {name}`"
         ));
     }
+    check_owner(&found, owners, "it", path)?;
     // A link may be in another folder than the file.
     let real = path.canonicalize().ok();
     for folder in [Some(path), real.as_deref()].into_iter().flatten() {
         let folder = folder_of(folder);
-        let mode = folder.metadata()?.mode() & 0o7777;
+        let found = folder.metadata()?;
+        check_owner(&found, owners, "its folder", folder)?;
+        let mode = found.mode() & 0o7777;
         // In a sticky folder, such as /tmp, only its owner replaces a file.
-        if mode & 0o002 != 0 && mode & 0o1000 == 0 {
+        if mode & 0o022 != 0 && mode & 0o1000 == 0 {
             let folder = folder.display();
             return denied(format!(
                 "other users of this host can replace it, because they can write its folder (mode \
-                 {mode:03o}): check its content, then run `chmod o-w {folder}`"
+                 {mode:03o}): check its content, then run `chmod go-w {folder}`"
             ));
         }
     }
     Ok(())
+}
+
+/// Checks whose a file or folder is, because its owner can change it whatever its mode.
+#[cfg(unix)]
+fn check_owner(
+    found: &std::fs::Metadata,
+    owners: Owners,
+    what: &str,
+    path: &Path,
+) -> io::Result<()> {
+    use std::os::unix::fs::MetadataExt as _;
+
+    let (owner, own) = (found.uid(), rustix::process::geteuid().as_raw());
+    if owners == Owners::Any || [0, own].contains(&owner) {
+        return Ok(());
+    }
+    denied(format!(
+        "{what} belongs to user {owner}, who can change it, and not to this user ({own}) or root: run this \
+         as that user, or check the content, then run `chown {own} {}`",
+        path.display()
+    ))
+}
+
+#[cfg(unix)]
+fn denied(text: String) -> io::Result<()> {
+    Err(io::Error::new(io::ErrorKind::PermissionDenied, text))
 }
 
 /// Whether systemd has put the file into the folder of this service's credentials. There an access control
@@ -116,7 +168,7 @@ fn is_credential(path: &Path, folder: Option<std::ffi::OsString>) -> bool {
 }
 
 #[cfg(not(unix))]
-fn check(_: &Path, _: &File, _: Readers) -> io::Result<()> {
+fn check(_: &Path, _: &File, _: Readers, _: Owners) -> io::Result<()> {
     Ok(())
 }
 
@@ -205,8 +257,10 @@ mod tests {
         set_mode(folders[0].path(), 0o777);
         for refused in reads() {
             let error = refused.unwrap_err().to_string();
-            assert!(error.contains("chmod o-w /"), "{error}");
+            assert!(error.contains("chmod go-w /"), "{error}");
         }
+        set_mode(folders[0].path(), 0o775);
+        assert!(reads().iter().all(Result::is_err), "a group may write it");
         set_mode(folders[0].path(), 0o1777);
         assert!(
             reads().iter().all(Result::is_ok),
@@ -214,6 +268,33 @@ mod tests {
         );
         set_mode(folders[1].path(), 0o777);
         assert!(reads()[0].is_ok() && reads()[1].is_err());
+    }
+
+    #[test]
+    fn a_file_of_another_user_or_in_his_folder_is_read_to_change_it_alone() {
+        use std::os::unix::fs::chown;
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        fs::write(&path, "content").unwrap();
+        for others in [path.as_path(), folder.path()] {
+            if chown(others, Some(4711), None).is_err() {
+                return println!("NOT TESTED: only root can make a file of another user");
+            }
+            for readers in [Readers::Owner, Readers::Everyone] {
+                set_mode(&path, readers.mode());
+                let error = read(&path, readers, 100).unwrap_err();
+                assert_eq!(error.kind(), io::ErrorKind::PermissionDenied);
+                let error = error.to_string();
+                assert!(error.contains("belongs to user 4711"), "{error}");
+                let remedy = format!("chown 0 {}`", others.display());
+                assert!(error.contains(&remedy), "{error}");
+                let changed = read_text_from(&path, readers, 100, Owners::Any);
+                assert_eq!(changed.unwrap(), "content");
+            }
+            chown(others, Some(0), None).unwrap();
+        }
+        assert!(read(&path, Readers::Everyone, 100).is_ok());
     }
 
     #[test]

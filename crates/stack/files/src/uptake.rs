@@ -23,8 +23,9 @@ const PAUSE: Duration = Duration::from_millis(50);
 ///
 /// A service marks the content of each [followed](crate::Followed) file with a shared lock until it uses
 /// another content, so an exclusive lock succeeds as soon as no service uses the former one. Contents that
-/// were replaced even earlier have no name left; on Linux they are found by the open files of the processes
-/// that this user may look into.
+/// were replaced even earlier have no name left; on Linux they are found by the open files of processes, also
+/// where a container has them at another path. If this user may not look into a process that has marked a file
+/// of the same file system, the uptake is unknown.
 #[derive(Debug)]
 pub struct FormerContent {
     path: PathBuf,
@@ -73,6 +74,14 @@ impl FormerContent {
             };
             let marked = self.processes();
             if !is_in_use && marked.former.is_empty() {
+                if !marked.hidden.is_empty() {
+                    let names: Vec<_> = marked.hidden.iter().map(ToString::to_string).collect();
+                    let text = format!(
+                        "this user may not see which files these have read: {}; ask as root",
+                        names.join(", ")
+                    );
+                    return Uptake::Unknown(io::Error::new(io::ErrorKind::PermissionDenied, text));
+                }
                 return match self.file {
                     _ if was_in_use || !marked.present.is_empty() => Uptake::Complete,
                     Ok(_) => Uptake::Unused,

@@ -8,6 +8,7 @@
 //! | [`Shares`], [`Tally`] | how much of a bounded table each owner holds, and how much it may |
 //! | [`Displacing`] | which idle entry of a bounded table gives way to a new one |
 //! | [`first_of_largest`] | which entry of a short list gives way: of the owner that holds the most |
+//! | [`last_of_crowd`] | the same for entries in use, which only a crowd gives up |
 //! | [`Yielding`] | which of the holders of bounded places gives way to a newcomer |
 //! | [`fair_selection`] | some of many items, evenly from all owners |
 //! | [`Places`] | connections of a server, of which one address gets only a share |
@@ -27,7 +28,7 @@ use std::time::{Duration, Instant};
 
 pub use displacing::{Displacing, Room};
 pub use places::{NoPlace, Place, Places, Source};
-pub use shares::{Shares, Tally, fair_selection, first_of_largest};
+pub use shares::{Shares, Tally, fair_selection, first_of_largest, last_of_crowd};
 pub use yielding::Yielding;
 
 /// A token bucket rate: a sustained rate and a burst.

@@ -141,6 +141,25 @@ pub fn first_of_largest<'i, T: 'i, K: Eq + Hash>(
     most.map(|(_, first)| first)
 }
 
+/// The entry that gives way to a newcomer in a full list of entries in use, the oldest first: the newest of the owner that
+/// has the most. `None` if the owner of the newcomer would have as many then, or the list is empty.
+///
+/// ```
+/// let oldest_first = ["a", "flood", "flood", "b", "flood"];
+/// assert_eq!(jaus_limits::last_of_crowd(&oldest_first, &"c", |it| *it), Some(4));
+/// assert_eq!(jaus_limits::last_of_crowd(&["a", "b"], &"c", |it| *it), None);
+/// ```
+pub fn last_of_crowd<T, K: Eq + Hash>(
+    items: &[T],
+    newcomer: &K,
+    owner: impl Fn(&T) -> K,
+) -> Option<usize> {
+    let newest_first = items.iter().rev();
+    let place = items.len() - 1 - first_of_largest(newest_first, &owner)?;
+    let held = |by: &K| items.iter().filter(|it| owner(it) == *by).count();
+    (held(&owner(&items[place])) > held(newcomer) + 1).then_some(place)
+}
+
 /// Selects at most `most` items, as evenly as possible from all owners: one of each, then a second,
 /// and so on. Items of one owner keep their order, and so do the selected ones.
 ///

@@ -1,8 +1,9 @@
 //! Requests for control at a component with Management, in virtual time.
 
 use bytes::Bytes;
+use jaus::endpoint::{LinkId, Path, Remote, SessionId};
 use jaus::messages::core::{ReleaseControl, RequestControl, Resume, SetEmergency};
-use jaus::service::{Discovery, Kind, Management, Profile, Scope, Stack, Timing};
+use jaus::service::{AccessControl, Discovery, Kind, Management, Profile, Scope, Stack, Timing};
 use jaus::wire::{Broadcast, Priority};
 
 use super::*;
@@ -22,11 +23,15 @@ struct Rover {
 
 impl Rover {
     fn new() -> Self {
+        Self::with(Management::new())
+    }
+
+    fn with(management: Management) -> Self {
         let profile = Profile::new(Kind::Vehicle, "Rover");
         let discovery = Discovery::new(ROVER, profile, Scope::Nobody, Timing::default(), 1);
         let stack = Stack::new(discovery, vec![Box::new(Handoff::new())]);
         let mut rover = Self {
-            stack: stack.management(Management::new()),
+            stack: stack.management(management),
             now: Instant::now(),
             sent: Vec::new(),
         };
@@ -42,6 +47,10 @@ impl Rover {
     }
 
     fn hear<M: Message>(&mut self, source: JausId, message: &M) {
+        self.hear_on(None, source, message);
+    }
+
+    fn hear_on<M: Message>(&mut self, path: Option<Path>, source: JausId, message: &M) {
         let received = Received {
             source,
             destination: ROVER,
@@ -50,7 +59,7 @@ impl Rover {
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
             sequence: None,
-            path: None,
+            path,
         };
         self.sent.clear();
         self.stack.handle_message(self.now, &received);
@@ -195,6 +204,19 @@ fn control_that_is_released_or_free_goes_to_the_client_that_waits() {
 }
 
 #[test]
+fn who_has_too_little_authority_for_the_component_is_not_told_that_it_has_control() {
+    let access = AccessControl::new().authority(50);
+    let mut rover = Rover::with(Management::new().access_control(access));
+    rover.hear(HOLDER, &ReleaseControl {});
+    rover.hear(OTHER, &request(49));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::INSUFFICIENT_AUTHORITY));
+    assert_eq!(rover.stands(), (State::Standby, None));
+    rover.hear(OTHER, &request(50));
+    assert_eq!(rover.answer_to(OTHER), Some(Answer::GRANTED));
+    assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+}
+
+#[test]
 fn a_request_that_is_withdrawn_is_over() {
     let mut rover = Rover::new();
     rover.hear(OTHER, &request(200));
@@ -219,6 +241,43 @@ fn a_takeover_leaves_requests_to_the_new_client_in_control() {
     assert_eq!(rover.stands().1, Some(THIRD));
     rover.hear(THIRD, &decide(1, Decision::GRANTED));
     assert_eq!(rover.stands(), (State::Standby, Some(OTHER)));
+}
+
+/// The path of a session with this number.
+fn session(number: u64) -> Option<Path> {
+    let peer = Remote::Session(SessionId(number));
+    Some(Path {
+        link: LinkId(1),
+        peer,
+    })
+}
+
+#[test]
+fn neither_the_ids_of_a_session_nor_the_sessions_of_a_subsystem_take_all_places() {
+    for is_one_session in [true, false] {
+        let mut rover = Rover::new();
+        for number in 0..10_u8 {
+            let path = session(if is_one_session { 1 } else { number.into() });
+            let client = JausId::new(50, 1, number + 1);
+            rover.hear_on(path, client, &request(1));
+            let is_full = usize::from(number) >= Handoff::MOST;
+            let expected = match is_full {
+                true => Answer::NOT_AVAILABLE,
+                false => Answer::QUEUED,
+            };
+            assert_eq!(rover.answer_to(client), Some(expected));
+        }
+        for (number, colleague) in [(20, OTHER), (21, THIRD)] {
+            rover.hear_on(session(number), colleague, &request(100));
+            assert_eq!(rover.answer_to(colleague), Some(Answer::QUEUED));
+        }
+        let told = rover.told(HOLDER).unwrap();
+        let expected = [50, 50, 50, 50, 50, 50, 43, 44];
+        assert_eq!(told, expected, "the newest have given way");
+        rover.hear_on(session(1), JausId::new(50, 1, 1), &request(1));
+        rover.hear_on(session(20), OTHER, &request(100));
+        assert_eq!(rover.answer_to(OTHER), Some(Answer::QUEUED));
+    }
 }
 
 #[test]

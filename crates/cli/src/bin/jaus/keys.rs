@@ -251,6 +251,7 @@ impl TrustKey {
                     ids,
                     rules,
                 };
+                tell_sharing(&path, &peer);
                 let add = || edit::trust(&path, &peer, self.also);
                 (peer.to_string(), Box::new(add))
             }
@@ -263,6 +264,24 @@ impl TrustKey {
             Some(control) => self.signer.propose(&control, approve::COMMAND, &[line]),
             None => with_uptake(&path, || done().map_err(Failure::of)),
         }
+    }
+}
+
+/// Names the peers that may use ids of a new one. A file that cannot be read is no reason to be silent about the
+/// change that follows, which names it.
+fn tell_sharing(path: &Path, peer: &Peer) {
+    let text = fs::read_to_string(path).unwrap_or_default();
+    let trust = Trust::parse(&text).unwrap_or_default();
+    for other in trust.sharing(peer) {
+        let ids = |of: &Peer| of.ids.iter().map(JausId::to_string).collect::<Vec<_>>();
+        say(format_args!(
+            "`{}` ({}) shares ids with `{}` ({}): an id belongs to the key with the narrower ids, and to both \
+             if they are as wide; give each key ids of its own, unless one is a relay",
+            peer.name,
+            ids(peer).join(","),
+            other.name,
+            ids(other).join(","),
+        ));
     }
 }
 

@@ -64,7 +64,7 @@ use jaus_cli::output;
     after_help = "Start with `jaus demo`: it needs no network, configuration or second \
         terminal.\n\n\
         Exit status: 0 success; 1 a negative result: no answer, control not granted, a failed check, \
-        unreadable input; 2 it could not run: wrong flag, missing file, port in use."
+        unreadable input, a node's port in use; 2 it could not run: wrong flag, missing file."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -8,10 +8,11 @@ use jaus::address::JausId;
 use jaus::component::{Change, Component, Kind};
 use jaus::endpoint::Event;
 use jaus::node::{ComponentEvents, Events, LinkReport, Local, Node, units};
+use jaus_cli::exposure;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::logging::{self, LevelRequests};
 use jaus_cli::metrics::{Metrics, MetricsFlags};
-use jaus_cli::network::{self, Network, SubsystemKind};
+use jaus_cli::network::{Network, SubsystemKind};
 use jaus_cli::runtime::{self, RunFor};
 use jaus_cli::statistics::{self, DropWatch};
 use jaus_cli::tree;
@@ -192,7 +193,7 @@ pub(crate) fn introduce(
     component: &Component,
     printer: &mut EventPrinter,
 ) -> Result<(), Failure> {
-    network::tell_exposure(node);
+    exposure::tell(node);
     let Some(output) = printer.output() else {
         let link = |it: &LinkReport| {
             json!({

@@ -1,6 +1,6 @@
 //! Files of recordings: opened for reading, and created for writing; and what they lack.
 
-use std::fs::File;
+use std::fs::{self, File, Metadata};
 use std::io::{self, BufReader};
 use std::path::Path;
 
@@ -19,20 +19,27 @@ pub(crate) fn open(path: &Path) -> Result<Recording<BufReader<File>>, Failure> {
 /// Creates a file for its owner and group, because it has all that operators and vehicles send each other. It
 /// must not exist without `overwrite`.
 pub(crate) fn create(path: &Path, overwrite: bool) -> Result<File, Failure> {
+    let failed = |error: io::Error| Failure::file(path, &error);
+    let there = path.symlink_metadata().ok().filter(|_| overwrite);
+    // A device or a pipe is written as it is. A file is replaced, so that neither its mode nor what a link
+    // leads to gets the recording.
+    let is_special = |it: &Metadata| !it.is_file() && !it.is_symlink();
     let mut options = jaus_files::options(Readers::Group);
-    options.truncate(true);
-    let options = if overwrite {
-        options.create(true)
-    } else {
-        options.create_new(true)
-    };
-    options.open(path).map_err(|error| match error.kind() {
-        io::ErrorKind::AlreadyExists => Failure::new(format!(
-            "{} exists already: choose another name, or add --overwrite",
-            path.display()
-        )),
-        _ => Failure::file(path, &error),
-    })
+    match &there {
+        Some(it) if is_special(it) => return options.create(true).open(path).map_err(failed),
+        Some(_) => fs::remove_file(path).map_err(failed)?,
+        None => {}
+    }
+    options
+        .create_new(true)
+        .open(path)
+        .map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => Failure::new(format!(
+                "{} exists already: choose another name, or add --overwrite",
+                path.display()
+            )),
+            _ => Failure::file(path, &error),
+        })
 }
 
 /// What a recording lacks.

@@ -3,6 +3,8 @@
 mod approve;
 mod certificates;
 mod programs;
+#[cfg(target_os = "linux")]
+mod reported;
 mod rights;
 mod rotation;
 #[cfg(target_os = "linux")]

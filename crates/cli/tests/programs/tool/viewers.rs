@@ -67,6 +67,31 @@ fn a_capture_becomes_mcap_and_pcapng_again_and_all_three_read_the_same() {
     assert_eq!(itself.status, 2);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_recording_that_is_written_over_is_a_file_of_its_own() {
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+    let folder = tempfile::tempdir().unwrap();
+    let [capture, victim, link, open] =
+        ["a.pcap", "victim", "link.pcapng", "open.pcapng"].map(|name| path(folder.path(), name));
+    let packet = ip_packet(&Message::new(EMERGENCY).datagram());
+    fs::write(&capture, pcap(RAW, &[packet])).unwrap();
+    fs::write(&victim, "precious").unwrap();
+    symlink(&victim, &link).unwrap();
+    fs::write(&open, "").unwrap();
+    fs::set_permissions(&open, fs::Permissions::from_mode(0o666)).unwrap();
+    for to in [&link, &open] {
+        let converted = run(&["convert", &capture, to, "--overwrite"], b"");
+        assert_eq!(converted.status, 0, "{converted:?}");
+        let written = fs::symlink_metadata(to).unwrap();
+        assert!(written.is_file() && written.len() > 0, "{to}");
+        let mode = written.permissions().mode();
+        assert_eq!(mode & 0o137, 0, "other users have it: {mode:o}");
+    }
+    assert_eq!(fs::read(&victim).unwrap(), b"precious");
+}
+
 #[test]
 fn a_recording_of_another_kind_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::net::{TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -115,6 +116,44 @@ fn no_unit_is_more_exposed_than_it_must_be() {
         };
         assert!(exposure <= most, "{unit}: {exposure}\n{said}");
     }
+}
+
+#[test]
+fn a_port_that_another_program_has_at_a_start_ends_no_service_for_good() {
+    for unit in units() {
+        let text = text_of(&unit);
+        assert!(text.contains("\nRestart=on-failure\n"), "{unit}");
+        assert!(text.contains("\nRestartPreventExitStatus=2\n"), "{unit}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let [key, trusted, settings] = ["node.key", "trusted_keys", "settings.toml"].map(file);
+    let made = Command::new(env!("CARGO_BIN_EXE_jaus"))
+        .args(["keys", "new", "--key", &key])
+        .output();
+    assert!(made.unwrap().status.success());
+    fs::write(&trusted, "").unwrap();
+    let (udp, tcp) = (
+        UdpSocket::bind("127.0.0.1:0"),
+        TcpListener::bind("127.0.0.1:0"),
+    );
+    let (udp, tcp) = (udp.unwrap(), tcp.unwrap());
+    let [udp, tcp] = [udp.local_addr(), tcp.local_addr()].map(|it| it.unwrap().to_string());
+    fs::write(&settings, format!("[tcp]\nlisten = \"{tcp}\"\n")).unwrap();
+    let start = |flags: &[&str]| {
+        let ended = Command::new(env!("CARGO_BIN_EXE_jaus-communicator"))
+            .args(["--loopback", "--port", "0", "--for", "5s"])
+            .args(flags)
+            .output()
+            .unwrap();
+        ended.status.code()
+    };
+    let listen = format!("--secure-listen={udp}");
+    let secure = ["--key", &key, "--trusted-keys", &trusted, &listen];
+    assert_eq!(start(&secure), Some(1));
+    assert_eq!(start(&["--config", &settings]), Some(1));
+    assert_eq!(start(&["--metrics", &tcp]), Some(1));
+    assert_eq!(start(&["--metrics", "192.0.2.1:9"]), Some(2), "a mistake");
 }
 
 /// Follows a recipe on a host with the units' users and views of the file system.

@@ -238,6 +238,41 @@ fn a_key_has_a_bounded_number_of_programs_and_a_silent_one_gives_way() {
 }
 
 #[test]
+fn a_thief_of_a_key_who_runs_many_programs_does_not_keep_its_owner_out() {
+    let (mut network, rover, operator) = vehicle_and_programs(1);
+    kill(&mut network, 1);
+    network.run(10 * SECOND);
+    for program in 0..MOST_INSTANCES as u16 {
+        let thief = network.add(&operator, &rover, &[address(1)]);
+        network.hosts[thief].address = SocketAddr::new(address(99).ip(), 4000 + program);
+    }
+    network.run(5 * SECOND);
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+    let owner = network.add(&operator, &rover, &[address(1)]);
+    network.run(5 * SECOND);
+    assert!(network.session(owner).is_some());
+    network.run(60 * SECOND);
+    assert!(network.session(owner).is_some());
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+}
+
+#[test]
+fn a_thief_at_many_addresses_does_not_end_the_oldest_session_of_the_owner() {
+    let (mut network, rover, operator) = vehicle_and_programs(1);
+    let station = network.session(1).unwrap().session;
+    let second = network.add(&operator, &rover, &[address(1)]);
+    let at_station = network.hosts[1].address;
+    network.hosts[second].address = SocketAddr::new(at_station.ip(), 4000);
+    network.run(5 * SECOND);
+    for _ in 2..MOST_INSTANCES + 2 {
+        network.add(&operator, &rover, &[address(1)]);
+    }
+    network.run(60 * SECOND);
+    assert_eq!(network.session(1).unwrap().session, station);
+    assert_eq!(sessions(&network, 0).len(), MOST_INSTANCES);
+}
+
+#[test]
 fn a_hello_is_no_key_to_the_session_of_another_program() {
     let (mut network, rover, operator) = vehicle_and_programs(1);
     let before = sessions(&network, 0);

@@ -21,13 +21,7 @@ fn with_libraries(vehicle: CryptoProvider, operator: CryptoProvider) -> Network 
 fn nodes_of_all_libraries_exchange_datagrams_both_ways() {
     for vehicle in LIBRARIES {
         for operator in LIBRARIES {
-            let mut network = with_libraries(vehicle(), operator());
-            let (report, command) = (judp("101.1.33", 20), judp("60.1.1", 900));
-            network.send(0, Priority::Standard, &report);
-            network.send(1, Priority::High, &command);
-            network.run(SECOND);
-            assert_eq!(network.hosts[1].received, [report]);
-            assert_eq!(network.hosts[0].received, [command]);
+            exchange_both_ways(&mut with_libraries(vehicle(), operator()));
         }
     }
 }

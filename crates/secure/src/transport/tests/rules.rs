@@ -54,6 +54,39 @@ fn decisions(network: &mut Network, host: usize) -> Vec<Decision> {
 }
 
 #[test]
+fn an_id_of_several_keys_belongs_to_those_with_the_narrowest_ids() {
+    let (mut network, trust, keys) = vehicle_and_operator();
+    let viewer = key();
+    let narrow = ["60.1.255", "60.255.255"];
+    let [operator, wide] = narrow.map(|it| it.parse::<JausId>().unwrap());
+    let both = |operators: JausId| {
+        let mut peers = vec![peer("operator", &keys[1], "60.1.255")];
+        peers[0].ids = vec![operators];
+        peers.push(peer("viewer", &viewer, "60.255.255"));
+        Trust::new(peers)
+    };
+    trust[0].replace(both(operator));
+    let rover = trusting([peer("rover", &keys[0], "101.255.255")]);
+    let viewing = network.add(&viewer, &rover, &[address(1)]);
+    network.run(2 * SECOND);
+    // The viewer comes first with the operator's id.
+    for id in ["60.1.1", "60.2.1"] {
+        network.send(viewing, Priority::Standard, &judp(id, 20));
+    }
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received, [judp("60.2.1", 20)]);
+    network.send(1, Priority::Standard, &judp("60.1.1", 30));
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received[1..], [judp("60.1.1", 30)]);
+    // With ids that are as wide, as those of a relay on a second way, both may use them.
+    trust[0].replace(both(wide));
+    network.run(SECOND);
+    network.send(viewing, Priority::Standard, &judp("60.1.1", 40));
+    network.run(SECOND);
+    assert_eq!(network.hosts[0].received[2..], [judp("60.1.1", 40)]);
+}
+
+#[test]
 fn a_key_that_may_observe_commands_nothing_and_is_told_so() {
     let (mut network, ..) = vehicle_with_rules("");
     let wrench = message("60.1.1", "101.1.1", &SetWrenchEffort::default());

@@ -109,9 +109,6 @@ struct Issue {
 
     #[command(flatten)]
     present: Present,
-
-    #[command(flatten)]
-    folder: Folder,
 }
 
 /// Approve a proposed certificate, issue and print it; or list those that wait
@@ -130,9 +127,6 @@ struct Approve {
 
     #[command(flatten)]
     present: Present,
-
-    #[command(flatten)]
-    folder: Folder,
 }
 
 #[derive(Args)]
@@ -143,9 +137,6 @@ struct Revoke {
 
     #[command(flatten)]
     present: Present,
-
-    #[command(flatten)]
-    folder: Folder,
 }
 
 #[derive(Args)]
@@ -229,13 +220,13 @@ impl Issue {
             ids: self.ids.0.clone(),
             life: self.life,
         };
-        if let Some(control) = self.folder.control()? {
+        if let Some(control) = self.present.folder.control()? {
             let line = request.line(SystemTime::now()).map_err(Failure::of)?;
             return self
                 .signer
                 .propose(&control, "jaus keys ca approve", &[line]);
         }
-        let authority = self.present.open(&self.folder)?;
+        let authority = self.present.open()?;
         let pem = authority
             .issue(&request, SystemTime::now())
             .map_err(Failure::of)?;
@@ -246,7 +237,7 @@ impl Issue {
 
 impl Approve {
     fn run(&self) -> Result<Outcome, Failure> {
-        let Some(control) = self.folder.control()? else {
+        let Some(control) = self.present.folder.control()? else {
             return Err(Failure::new(
                 "the authority is not under dual control: write those who approve into `approvers` in its folder",
             ));
@@ -256,7 +247,7 @@ impl Approve {
         };
         let (key, now) = (self.signer.key()?, SystemTime::now());
         // Before it is signed, so that a wrong passphrase does not spend the approval.
-        let authority = self.present.open(&self.folder)?;
+        let authority = self.present.open()?;
         let approved = control.approve(id, &key, now).map_err(Failure::of)?;
         let pem = authority
             .issue_approved(&approved, now)
@@ -268,8 +259,8 @@ impl Approve {
 
 impl Revoke {
     fn revoke(&self) -> Result<Outcome, Failure> {
-        let list = self.folder.path()?.join("ca.crl");
-        let authority = self.present.open(&self.folder)?;
+        let list = self.present.folder.path()?.join("ca.crl");
+        let authority = self.present.open()?;
         with_uptake(&list, || {
             let revoked = authority.revoke(&self.which, SystemTime::now());
             let revoked = revoked.map_err(Failure::of)?;

@@ -102,6 +102,23 @@ fn a_certificate_needs_no_trust_file_and_is_revoked_by_one_command() {
 }
 
 #[test]
+fn a_trust_file_that_is_named_and_missing_is_told_at_the_start() {
+    let (office, host) = (Office::new(), host());
+    office.issue(&host, "rover", "115.255.255", "30d");
+    let mut node = vec!["node", "--loopback", "--id", "115.1.13", "--for", "100ms"];
+    let flags = office.flags(&host);
+    node.push("--secure-listen=127.0.0.1:0");
+    node.extend(flags.iter().map(String::as_str));
+    let warning = "missing, so no line narrows a certificate";
+    let started = run(&node, b"");
+    assert!(started.stderr.contains(warning), "{started:?}");
+    std::fs::write(host.file("trusted_keys"), "").unwrap();
+    let started = run(&node, b"");
+    assert!(!started.stderr.contains(warning), "{started:?}");
+    assert_eq!(started.status, 0, "{started:?}");
+}
+
+#[test]
 fn a_certificate_of_another_authority_gets_no_link() {
     let (office, other, stranger) = (Office::new(), Office::new(), host());
     let (_vehicle, _host, address) = vehicle(&office, "115.1.7");

@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::fs::{PermissionsExt as _, chown};
 use std::os::unix::process::CommandExt as _;
-use std::process::{Child, ChildStdout, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use super::*;
 use crate::support::jaus;
@@ -80,28 +80,85 @@ impl Drop for OfNobody {
     }
 }
 
-#[test]
-fn a_vehicle_that_cannot_read_its_trusted_keys_any_more_is_named() {
+/// A host that trusts an operator's key, which is returned, and a vehicle of another user there.
+fn vehicle_of_nobody() -> Option<(Host, String, OfNobody)> {
     let host = Host::new();
     host.new_key();
     let key = Host::new().new_key();
     host.trust("operator", &key, "60.255.255");
-    let set_mode = |name: &str, mode| {
-        let mode = std::fs::Permissions::from_mode(mode);
-        std::fs::set_permissions(host.file(name), mode).unwrap();
+    set_mode(&host, "", 0o755);
+    let vehicle = OfNobody::start(&host);
+    if vehicle.is_none() {
+        eprintln!("SKIPPED: only root can start a program as another user");
+    }
+    Some((host, key, vehicle?))
+}
+
+fn set_mode(host: &Host, name: &str, mode: u32) {
+    let mode = std::fs::Permissions::from_mode(mode);
+    std::fs::set_permissions(host.file(name), mode).unwrap();
+}
+
+#[test]
+fn root_revokes_a_key_with_a_private_umask_and_the_service_of_another_user_takes_it() {
+    let Some((host, _key, _vehicle)) = vehicle_of_nobody() else {
+        return;
     };
-    set_mode("", 0o755);
-    let Some(_vehicle) = OfNobody::start(&host) else {
-        return eprintln!("SKIPPED: only root can start a program as another user");
+    let revoked = Command::new("sh")
+        .args(["-c", "umask 077; exec \"$0\" keys revoke operator \"$@\""])
+        .arg(env!("CARGO_BIN_EXE_jaus"))
+        .args(host.flags())
+        .output()
+        .unwrap();
+    let said = String::from_utf8(revoked.stderr).unwrap();
+    assert!(revoked.status.success() && said.contains(TAKEN), "{said}");
+}
+
+#[test]
+fn a_vehicle_whose_container_keeps_the_first_content_is_named_by_each_change() {
+    let (inside, outside) = (Host::new(), Host::new());
+    inside.new_key();
+    let key = Host::new().new_key();
+    outside.trust("operator", &key, "60.255.255");
+    // The file that is mounted there stays, though another one has its name here.
+    std::fs::write(inside.file("trusted_keys"), "").unwrap();
+    let listen = format!("--secure-listen=127.0.0.1:{}", free_port());
+    let script = "mount --bind \"$1\" \"$2\" || exit 9; shift 2; exec \"$0\" \"$@\"";
+    let mut vehicle = Command::new("unshare")
+        .args(["--mount", "sh", "-c", script, env!("CARGO_BIN_EXE_jaus")])
+        .args([outside.file("trusted_keys"), inside.file("trusted_keys")])
+        .args(["vehicle", "--id", "115.1.12", "--for", "60s", &listen])
+        .args(inside.flags())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut output = BufReader::new(vehicle.stdout.take().unwrap());
+    let mut lines = output.by_ref().lines();
+    if !lines.any(|line| line.unwrap().contains("Ctrl-C")) {
+        return eprintln!("SKIPPED: no mount here");
+    }
+    is_not_taken(&outside.keys(&["revoke", "operator"]));
+    for name in ["tablet", "laptop"] {
+        is_not_taken(&outside.keys(&["trust", name, &key, "61.255.255"]));
+        is_not_taken(&outside.keys(&["revoke", name]));
+    }
+    vehicle.kill().unwrap();
+    vehicle.wait().unwrap();
+}
+
+#[test]
+fn a_vehicle_that_cannot_read_its_trusted_keys_any_more_is_named() {
+    let Some((host, key, _vehicle)) = vehicle_of_nobody() else {
+        return;
     };
     // The slip of an administrator, before the key is stolen.
     let path = host.file("trusted_keys");
     let copy = host.file("copy");
     std::fs::copy(&path, &copy).unwrap();
-    set_mode("copy", 0o600);
+    set_mode(&host, "copy", 0o600);
     std::fs::rename(copy, path).unwrap();
     is_not_taken(&host.keys(&["revoke", "operator"]));
-    set_mode("trusted_keys", 0o644);
+    set_mode(&host, "trusted_keys", 0o644);
     let trusted = host.keys(&["trust", "tablet", &key, "61.255.255"]);
     assert_eq!(trusted.status, 0, "{trusted:?}");
     assert!(trusted.stderr.contains(TAKEN), "{trusted:?}");

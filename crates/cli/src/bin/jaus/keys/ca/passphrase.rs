@@ -16,19 +16,22 @@ use crate::terminal::{ask, ask_twice};
 /// The longest file with a passphrase, in octets.
 const LONGEST: u64 = 4096;
 
-/// How the key of an existing authority is opened.
+/// An existing authority, and how its key is opened.
 #[derive(Args)]
 pub(super) struct Present {
     /// Read the passphrase of ca.key from the first line of this file, such as /dev/stdin or
     /// <(pass show ca), instead of the terminal
     #[arg(long, value_name = "FILE")]
     passphrase_file: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(super) folder: Folder,
 }
 
 impl Present {
     /// Opens the authority; asks for the passphrase if its key is encrypted.
-    pub(super) fn open(&self, folder: &Folder) -> Result<CertificateAuthority, Failure> {
-        let folder = folder.path()?;
+    pub(super) fn open(&self) -> Result<CertificateAuthority, Failure> {
+        let folder = self.folder.path()?;
         let key = CertificateAuthority::key_path(&folder);
         let passphrase = self.of(&key)?;
         if passphrase.is_none() {
@@ -72,14 +75,11 @@ pub(super) struct Change {
     /// Leave the key unencrypted: anyone who copies the file can issue certificates
     #[arg(long)]
     unencrypted: bool,
-
-    #[command(flatten)]
-    folder: Folder,
 }
 
 impl Change {
     pub(super) fn run(&self) -> Result<Outcome, Failure> {
-        let key = CertificateAuthority::key_path(&self.folder.path()?);
+        let key = CertificateAuthority::key_path(&self.present.folder.path()?);
         let old = self.present.of(&key)?;
         let file = self.new_passphrase_file.as_deref();
         let new = chosen(file, self.unencrypted, "--new-passphrase-file")?;
