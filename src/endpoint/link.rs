@@ -7,6 +7,7 @@ use std::net::SocketAddr;
 use bytes::Bytes;
 use jaus_limits::quota_address;
 
+use crate::rights::Acceptance;
 use crate::wire::{Framing, Priority};
 
 /// Identifies a link of the node. The owner assigns the numbers.
@@ -26,6 +27,9 @@ pub struct LinkProfile {
     pub max_segments: usize,
     /// Whether the remote end reads only the first message of a datagram.
     pub reads_one: bool,
+    /// Of a bridge: what the components of its other side may do. Ids that no grant there names and gives
+    /// rights ([`Acceptance::trusts`]) give way to components on other links.
+    pub guests: Option<Acceptance>,
 }
 
 impl LinkProfile {

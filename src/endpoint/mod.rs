@@ -43,6 +43,7 @@ mod duplicates;
 mod egress;
 mod event;
 mod forward;
+mod guests;
 mod large;
 mod link;
 mod peers;
@@ -73,6 +74,7 @@ pub(crate) use egress::MOST_OCTETS;
 pub use egress::Packing;
 pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
 pub use forward::Routing;
+pub use guests::ID_HELD;
 pub use link::{LinkId, LinkProfile, Path, Remote, SessionId, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
 

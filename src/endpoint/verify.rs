@@ -38,12 +38,13 @@ pub(super) enum Warning {
     NotGranted,
     OwnNotGranted,
     Reserved,
+    Guest,
     Unverified,
 }
 
 /// When each warning was last logged.
 #[derive(Debug, Default)]
-pub(super) struct Warnings([Option<Instant>; 10]);
+pub(super) struct Warnings([Option<Instant>; 11]);
 
 impl Warnings {
     /// Whether a warning may be logged again.

@@ -14,6 +14,7 @@ use bytes::Bytes;
 use crate::address::JausId;
 use crate::counters::Count;
 use crate::endpoint::{SessionId, Transmit};
+use crate::rights::Acceptance;
 
 /// A link of another crate.
 ///
@@ -26,6 +27,12 @@ pub trait CustomLink: fmt::Debug + Send {
     /// Its counters so far, for reports and metrics: always the same ones, even if they are zero.
     fn counters(&self) -> Vec<Count> {
         Vec::new()
+    }
+
+    /// Of a bridge, what the components of its other side may do: see
+    /// [`LinkProfile::guests`](crate::endpoint::LinkProfile::guests).
+    fn guests(&self) -> Option<Acceptance> {
+        None
     }
 
     /// Queues a datagram from the endpoint: for one session, or for all of them

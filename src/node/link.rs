@@ -43,6 +43,10 @@ impl Link {
                 reads_one: true,
                 ..LinkProfile::judp([])
             },
+            Self::Custom(link) => LinkProfile {
+                guests: link.guests(),
+                ..LinkProfile::default()
+            },
             _ => LinkProfile {
                 framing: self.framing(),
                 ..LinkProfile::default()

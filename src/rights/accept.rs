@@ -117,10 +117,11 @@ impl Acceptance {
         self.0.iter().all(|grant| grant.rules.only_watch())
     }
 
-    /// Whether this id may do more than [`Rules::watch`] allows.
+    /// Whether a grant names this id, instead of everybody, and lets it do more than [`Rules::watch`] allows.
     #[must_use]
     pub fn trusts(&self, id: JausId) -> bool {
-        grant_of(&self.0, id).is_some_and(|grant| !grant.rules.only_watch())
+        let is_trust = |it: &Grant| it.ids != JausId::EVERYONE && !it.rules.only_watch();
+        grant_of(&self.0, id).is_some_and(is_trust)
     }
 
     /// Checks a message; the table tells what it needs.
@@ -272,6 +273,11 @@ mod tests {
             assert!(both.trusts(OPERATOR), "{more}");
             assert!(!both.trusts(JausId::new(61, 1, 1)), "{more}");
         }
+        let all = acceptance(&["65535.255.255 observe"]);
+        assert!(
+            !all.only_watches() && !all.trusts(OPERATOR),
+            "nobody is named"
+        );
     }
 
     #[test]

@@ -14,7 +14,7 @@
 //! | `configure` | shut components down, reset them, set their time |
 //! | `with=101.255.255,102.1.255` | exchange messages with these ids alone |
 //! | `only=PrimitiveDriver,D103h` | of all commands, send these alone |
-//! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries |
+//! | `except=SetTravelSpeed,Time` | send none of these, whether commands or queries, nor get the reports that answer them |
 //! | `also=D103h` | send these codes, too, although no definition states what they need; `also=any`: all of them |
 //!
 //! `only` and `except` name services, messages or message codes. A name that the definitions in use do not
@@ -25,8 +25,8 @@
 //! All rules also apply to the messages that a message carries: the query in a request for an event, the
 //! elements of a list, the messages of a mission. `with` applies to the component that a mission names for
 //! each message. What a message carries must be in its first fragment, unless its sender may do everything.
-//! The reports inside Event and Report Events are not looked at: they answer a subscription, and no receiver
-//! obeys them.
+//! The reports inside Event and Report Events are not looked at when they are sent, because no receiver obeys
+//! them; those inside Event are when they are received ([`Rules::may_receive`]).
 //!
 //! # `only`
 //!
@@ -72,10 +72,13 @@ pub use table::{CLEAR_ALL, Permission, Table, TableError, clears_all};
 pub use words::RuleError;
 
 use crate::address::JausId;
-use crate::codec::Message as _;
-use crate::messages::core::SetEmergency;
+use crate::codec::{Message as _, query_code};
+use crate::messages::core::{Event, SetEmergency};
 use crate::wire::{DataControl, Frame};
 use carried::Carried;
+
+/// The octets of Event before the report that it carries: its code, id and number, and a count of four octets.
+const BEFORE_REPORT: usize = 8;
 
 /// What a sender may do. The default is to observe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -331,6 +334,23 @@ impl Rules {
     #[must_use]
     pub fn may_reach(&self, id: JausId) -> bool {
         self.with.is_empty() || self.with.iter().any(|with| with.overlaps(id))
+    }
+
+    /// Whether a frame may go to the holder: no report that it may not query now, be it sent as it is or in an
+    /// Event. So what `except` adds ends subscriptions that stand already.
+    #[must_use]
+    pub fn may_receive(&self, frame: &Frame, table: &Table) -> bool {
+        if self.except.is_empty() || !begins(frame) {
+            return true;
+        }
+        let message = &*frame.payload;
+        let report = match table::code_of(message) {
+            Some(Event::CODE) => message.get(BEFORE_REPORT..).and_then(table::code_of),
+            code => code,
+        };
+        report.and_then(query_code).is_none_or(|query| {
+            !self.except.has_unknown(table) && !self.except.contains(query, table)
+        })
     }
 
     /// Whether it may send to, or receive from, any of these ids.

@@ -42,6 +42,17 @@ pub const fn report_code(query: u16) -> Option<u16> {
     }
 }
 
+/// The code of the query that a report answers; `None` if the code is not a report. The inverse of
+/// [`report_code`].
+#[must_use]
+pub const fn query_code(report: u16) -> Option<u16> {
+    match report {
+        0x4000..=0x5FFF => Some(report - 0x2000),
+        0xF000..=0xFFFF => Some(report - 0x1000),
+        _ => None,
+    }
+}
+
 /// Drops the content of an optional field that is not requested.
 #[doc(hidden)]
 pub fn keep_if<T>(is_requested: bool, field: &mut Option<T>) {
@@ -90,6 +101,12 @@ mod tests {
         assert_eq!(report_code(0xE702), Some(0xF702));
         for other in [0x0405, 0x4B00, 0xD110, 0xF702] {
             assert_eq!(report_code(other), None, "{other:04X}");
+        }
+        for code in 0..=u16::MAX {
+            let query = query_code(code);
+            assert_eq!(query.and_then(report_code), query.map(|_| code));
+            let report = report_code(code);
+            assert_eq!(report.and_then(query_code), report.map(|_| code));
         }
     }
 }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message as _;
-use jaus::endpoint::{Remote, SessionId, To, Transmit};
+use jaus::endpoint::{ID_HELD, Remote, SessionId, To, Transmit};
 use jaus::link::custom::Arrival;
 use jaus::messages::core::QueryIdentification;
 use jaus::rights::{Acceptance, DecisionQueue, InControl, Table};
@@ -48,9 +48,6 @@ pub struct Settings {
 
 /// How long a component belongs to this side after it was last heard.
 const LOCAL_FOR: Duration = Duration::from_secs(10);
-/// How long the id of a silent component stays with this side, unless `accept` gives it rights and so says that
-/// it may come from the zenoh side: nobody takes an id because its component is off for a while.
-const HELD_FOR: Duration = Duration::from_secs(600);
 /// The largest payload: a UDP datagram.
 const LARGEST: usize = 65_507;
 
@@ -90,7 +87,8 @@ pub struct Exchange {
     remotes: Remotes,
     /// The components of this side.
     locals: BTreeMap<JausId, Local>,
-    /// Those that are silent, and since when: their ids still belong to this side.
+    /// Those that are silent, and since when: their ids still belong to this side, unless `accept` gives them
+    /// rights and so says that they may come from the zenoh side.
     silent: BTreeMap<JausId, Instant>,
     /// Their subsystems, whose views this bridge serves.
     served: BTreeSet<u16>,
@@ -143,6 +141,12 @@ impl Exchange {
     #[must_use]
     pub const fn prefix(&self) -> &Prefix {
         &self.prefix
+    }
+
+    /// The ids that may come from the zenoh side, and their rights.
+    #[must_use]
+    pub const fn accept(&self) -> &Acceptance {
+        &self.accept
     }
 
     /// Counts of what passed and what was dropped.
@@ -270,21 +274,21 @@ impl Exchange {
     /// Whether an id belongs to this side: its component was heard lately, or is silent, but no rule lets the id
     /// come from the zenoh side.
     fn is_held(&self, now: Instant, id: JausId) -> bool {
-        let is_kept = |since: &Instant| now.saturating_duration_since(*since) < HELD_FOR;
+        let is_kept = |since: &Instant| now.saturating_duration_since(*since) < ID_HELD;
         self.is_local(now, id) || self.silent.get(&id).is_some_and(is_kept)
     }
 
-    /// Notes a component of this side: `heard` is when its latest message arrived, or now if it is attached to the node.
+    /// Notes a component of this side: `heard` is when its latest message arrived, or now if it is attached to the
+    /// node. A bridge that speaks for its id loses the id, unless `accept` gives it rights.
     pub fn handle_local(&mut self, now: Instant, id: JausId, heard: Instant) {
         if !is_recent(now, heard) || !self.offers(id) {
             return;
         }
         match self.remotes.owner(id) {
-            Some(owner) => self.note_hidden(now, id, owner),
-            None => {
-                // What keeps it out is counted when it sends something.
-                let _ = self.enter(id, heard);
-            }
+            Some(owner) if self.accept.trusts(id) => self.note_hidden(now, id, owner),
+            // What keeps it out is counted when it sends something.
+            owner if self.enter(id, heard).is_ok() && owner.is_some() => self.take_back(now, id),
+            _ => {}
         }
     }
 
@@ -380,7 +384,7 @@ impl Exchange {
     fn recipient(&self, destination: JausId, to: Recipient) -> Result<Recipient, Counter> {
         match self.remotes.owner(destination) {
             Some(owner) => Ok(Recipient::Bridge(owner)),
-            None if to == Recipient::All && !destination.has_wildcard() => Err(Counter::NotPresent),
+            None if !destination.has_wildcard() => Err(Counter::NotPresent),
             None => Ok(to),
         }
     }
@@ -482,7 +486,7 @@ impl Exchange {
         }
         let silent = std::mem::take(&mut self.silent);
         let is_kept =
-            |&(_, since): &(JausId, Instant)| now.saturating_duration_since(since) < HELD_FOR;
+            |&(_, since): &(JausId, Instant)| now.saturating_duration_since(since) < ID_HELD;
         let (kept, over): (Vec<_>, Vec<_>) = silent.into_iter().partition(is_kept);
         self.silent = kept.into_iter().collect();
         for (id, _) in over {

@@ -8,6 +8,7 @@ use jaus::counters::Count;
 use jaus::endpoint::Transmit;
 use jaus::link::custom::{Arrival, CustomLink};
 use jaus::node::Recorder;
+use jaus::rights::Acceptance;
 use zenoh::query::Query;
 
 use crate::exchange::Exchange;
@@ -136,6 +137,10 @@ impl CustomLink for ZenohLink {
 
     fn counters(&self) -> Vec<Count> {
         self.shared.lock().exchange.counters().counts().collect()
+    }
+
+    fn guests(&self) -> Option<Acceptance> {
+        Some(self.shared.lock().exchange.accept().clone())
     }
 
     fn transmit(&mut self, transmit: &Transmit) {

@@ -181,23 +181,36 @@ impl Remotes {
     /// A bridge has withdrawn the token of a component, or is gone itself.
     pub(crate) fn withdraw(&mut self, bridge: BridgeId, component: JausId) -> Withdrawn {
         self.claims.remove(component, bridge);
-        let mut withdrawn = Withdrawn::default();
-        let Some(remote) = self.bridges.get_mut(&bridge) else {
-            return withdrawn;
-        };
-        if !remote.components.remove(&component) {
-            return withdrawn;
+        if self.owner(component) != Some(bridge) {
+            return Withdrawn::default();
         }
-        if remote.components.is_empty() {
-            let session = remote.session;
-            self.bridges.remove(&bridge);
-            self.sessions.remove(&session);
-            tracing::info!(%bridge, session = session.0, "bridge gone");
-            withdrawn.closed = Some(session);
-        }
+        let closed = self.leave(bridge, component);
+        let next = self.release(component);
+        Withdrawn { closed, next }
+    }
+
+    /// A component of this side uses an id: the bridge that speaks for it loses it, and gets it again when that
+    /// is gone. Returns this bridge, and its session if that ends.
+    pub(crate) fn take_back(&mut self, component: JausId) -> Option<(BridgeId, Option<SessionId>)> {
+        let owner = self.owner(component)?;
+        let closed = self.leave(owner, component);
+        self.claim(owner, component);
+        Some((owner, closed))
+    }
+
+    /// The owner of a component speaks for it no more. Returns its session if that ends.
+    fn leave(&mut self, owner: BridgeId, component: JausId) -> Option<SessionId> {
         self.owners.remove(&component);
-        withdrawn.next = self.release(component);
-        withdrawn
+        let remote = self.bridges.get_mut(&owner)?;
+        remote.components.remove(&component);
+        if !remote.components.is_empty() {
+            return None;
+        }
+        let session = remote.session;
+        self.bridges.remove(&owner);
+        self.sessions.remove(&session);
+        tracing::info!(bridge = %owner, session = session.0, "bridge gone");
+        Some(session)
     }
 }
 

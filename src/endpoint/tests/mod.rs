@@ -10,6 +10,7 @@ mod delivery;
 mod duplicates;
 mod flood;
 mod fragments;
+mod guests;
 mod hosts;
 mod identity;
 mod junior;

@@ -77,6 +77,8 @@ pub struct Gateway {
     routes: BTreeMap<RaId, Target>,
     /// Former ids of RA components: stale discovery data may still list them.
     former: BTreeMap<JausId, Instant>,
+    /// Ids that RA components have lost to components of the JAUS side, and until when they do not get them.
+    taken: BTreeMap<JausId, Instant>,
     /// RA numbers of the shown subsystems, by JAUS number.
     shown: BTreeMap<u16, u8>,
     actions: VecDeque<Action>,
@@ -148,6 +150,7 @@ impl Gateway {
             changed: BTreeMap::new(),
             routes: BTreeMap::new(),
             former: BTreeMap::new(),
+            taken: BTreeMap::new(),
             shown: BTreeMap::new(),
             actions: VecDeque::new(),
             decisions: DecisionQueue::default(),

@@ -11,8 +11,9 @@ use crate::message::Message;
 use crate::{RaId, node};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
-use jaus::endpoint::{Outgoing, Received};
+use jaus::endpoint::{ID_HELD, Outgoing, Received, Remote};
 use jaus::messages::core::QueryIdentification;
+use jaus::rights::Unaccepted;
 use jaus::service::{Event, Kind, Profile, code_of};
 use jaus::wire::Broadcast;
 
@@ -23,9 +24,6 @@ impl Gateway {
     /// Updates the proxies for a new or changed RA subsystem.
     pub(super) fn list(&mut self, now: Instant, subsystem: &node::RaSubsystemEntry) {
         let number = subsystem.id;
-        if let Err(collision) = self.claim(Side::Ra, number.into()) {
-            return self.tally.refuse(now, Counter::Collision, 0, collision);
-        }
         let mut listed = BTreeMap::new();
         for (ra, component) in subsystem.components() {
             match self.ids.jaus_id(ra) {
@@ -75,11 +73,11 @@ impl Gateway {
         }
     }
 
-    /// Opens the proxy of an RA component; returns whether there was room.
+    /// Opens the proxy of an RA component; returns whether it may have this id, and there was room.
     fn open(&mut self, now: Instant, id: JausId, ra: RaId, profile: Profile) -> bool {
-        let full = self.proxies.len() >= self.settings.max_components;
-        if full || id == self.own_stack.id() {
-            self.tally.refuse(now, Counter::TooManyComponents, 0, ra);
+        if let Err((counter, why)) = self.check_id(now, id, ra) {
+            self.tally
+                .refuse(now, counter, 0, format_args!("{ra}: {why}"));
             return false;
         }
         let mut proxy = Proxy::new(Plan {
@@ -99,6 +97,46 @@ impl Gateway {
         self.with_front(now, id, |_, _| {});
         self.call_everybody(id);
         true
+    }
+
+    /// Whether an RA component may have an id on the JAUS side: answers to it cross the gateway.
+    fn check_id(&mut self, now: Instant, id: JausId, ra: RaId) -> Result<(), (Counter, String)> {
+        let grants = &self.settings.grants;
+        if !grants.accepts(id) {
+            let why = format!("{} (--ra-grant)", Unaccepted::Source);
+            return Err((Counter::NotGranted, why));
+        }
+        let of_jaus = || self.own_stack.directory().component(id).is_some();
+        let is_former = self.former.get(&id).is_some_and(|until| now < *until);
+        let is_taken = self.taken.get(&id).is_some_and(|until| now < *until);
+        if !grants.trusts(id) && (is_taken || (of_jaus() && !is_former)) {
+            let why = format!("{id} is a component of the JAUS side");
+            return Err((Counter::Collision, why));
+        }
+        if self.proxies.len() >= self.settings.max_components || id == self.own_stack.id() {
+            return Err((Counter::TooManyComponents, id.to_string()));
+        }
+        let claimed = self.claim(Side::Ra, ra.subsystem.into());
+        claimed.map_err(|collision| (Counter::Collision, collision.to_string()))
+    }
+
+    /// A component of the JAUS side uses an id that the gateway has attached. It is that component's from now on,
+    /// unless the settings give the RA component more rights than to look.
+    pub fn handle_conflict(&mut self, now: Instant, id: JausId, from: Remote) {
+        let Some(proxy) = self.proxies.get(&id) else {
+            return;
+        };
+        if self.settings.grants.trusts(id) {
+            return;
+        }
+        let ra = proxy.ra();
+        tracing::warn!(
+            "RA component {ra} loses {id}: the component of the JAUS side at {from} has this id"
+        );
+        self.dismiss(now, id);
+        self.taken.retain(|_, until| now < *until);
+        self.taken.insert(id, now + ID_HELD);
+        self.settle(now);
     }
 
     /// Broadcasts a query so that every node learns the proxy's address: the proxy's own discovery
@@ -127,12 +165,18 @@ impl Gateway {
         for id in gone {
             self.dismiss(now, id);
         }
-        self.release(Side::Ra, subsystem.into());
     }
 
     fn dismiss(&mut self, now: Instant, id: JausId) {
         self.with_front(now, id, |proxy, tally| proxy.take_leave(now, tally));
-        self.proxies.remove(&id);
+        let Some(proxy) = self.proxies.remove(&id) else {
+            return;
+        };
+        let subsystem = proxy.ra().subsystem;
+        let mut others = self.proxies.values().map(|it| it.ra().subsystem);
+        if others.all(|it| it != subsystem) {
+            self.release(Side::Ra, subsystem.into());
+        }
         self.listed.remove(&id);
         self.former.insert(id, now + Self::FORMER);
         self.actions.push_back(Action::Detach(id));
@@ -283,10 +327,6 @@ impl Gateway {
                 *until = now + Self::GUEST;
             }
             return Some(id);
-        }
-        if let Err(collision) = self.claim(Side::Ra, source.subsystem.into()) {
-            self.tally.refuse(now, Counter::Collision, 0, collision);
-            return None;
         }
         let name = RaComponent(source.component).to_string();
         let profile = Profile {

@@ -15,7 +15,7 @@ use super::{Action, Gateway, Report, Settings};
 use crate::RaId;
 use crate::carrier::To;
 use jaus::address::JausId;
-use jaus::endpoint::Received;
+use jaus::endpoint::{Event, Received};
 use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
 use jaus::node::{Node, Port, Recorder, Resident, now, sleep_until};
@@ -190,6 +190,7 @@ impl Running {
     async fn go(&mut self) -> Result<Infallible, PartError> {
         self.gateway.start(now());
         let mut ticks = self.reports.filter(|it| !it.is_zero()).map(ticks);
+        let mut events = self.node.events();
         loop {
             self.carry_out();
             let wake = self.gateway.poll_timeout();
@@ -200,6 +201,9 @@ impl Running {
                     }
                     Arrival::Message(message) => self.gateway.handle_message(now(), &message),
                     Arrival::NodeStopped => return Err(PartError::NodeStopped),
+                },
+                Some(event) = events.recv() => if let Event::IdConflict { id, path } = event {
+                    self.gateway.handle_conflict(now(), id, path.peer);
                 },
                 () = sleep_until(wake) => self.gateway.handle_timeout(now()),
                 () = tick(&mut ticks) => (self.reporter)(&self.gateway.report()),

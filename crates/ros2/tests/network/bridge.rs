@@ -243,3 +243,31 @@ async fn by_default_python_sees_the_vehicle_and_moves_nothing() {
     assert_eq!(scene.rover.controller().await, 0);
     scene.rover.end().await;
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs packages of Python: run .ci/ros2"]
+async fn what_nodes_do_by_their_topics_is_in_the_audit_file_with_the_publisher() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("audit.jsonl");
+    let scene = Scene::start(&[&CONTROL[..], &["--audit", log.to_str().unwrap()]].concat());
+    scene.is_seen().await;
+    let _pilot = scene.python(&["drive", "1.0", "0.0"]);
+    scene.drives().await;
+    let _stop = scene.python(&["emergency", "1"]);
+    let who = |what: &str| {
+        let lines = std::fs::read_to_string(&log).unwrap_or_default();
+        let of_publisher = |line: &&str| {
+            line.contains("\"who\":\"ROS publisher ")
+                && line.contains(&format!("\"message\":\"{what}\""))
+                && line.contains("\"result\":\"allowed\"")
+        };
+        let line = lines.lines().find(of_publisher)?;
+        let (_, who) = line.split_once("ROS publisher ")?;
+        who.split('"').next().map(str::to_owned)
+    };
+    until(|| who("SetEmergency").is_some()).await;
+    let pilot = who("RequestControl").unwrap();
+    assert_eq!(who("ConfirmControl"), Some(pilot.clone()));
+    assert_ne!(who("SetEmergency"), Some(pilot), "another node's");
+    scene.rover.end().await;
+}

@@ -44,7 +44,7 @@ jaus::counters! {
     StrayFragments = "dropped: fragment of a message that its session did not begin",
     Malformed = "dropped: not JUDP",
     /// Messages not sent to a peer because the rules separate it from their source.
-    Separated = "not sent: rules separate source and peer",
+    Separated = "not sent: rules keep it from the peer",
     /// Datagrams dropped because the peer or the network was too slow.
     SendOverflows = "not sent: peer or network too slow",
     NoSession = "not sent: session has ended",

@@ -65,7 +65,7 @@ impl Transport {
     }
 
     /// What of a datagram may go to this session: messages for its ids, as far as the rules do not
-    /// separate it from their sources.
+    /// separate it from their sources, nor forbid it to query what they report.
     fn permitted(&mut self, session: SessionId, datagram: &Bytes) -> Option<Bytes> {
         let peers = || self.sessions.values().filter_map(Session::established);
         let has_limits = peers().any(|peer| !peer.rules.with.is_empty());
@@ -78,7 +78,9 @@ impl Transport {
                 let origins: Vec<_> = peers().filter(speaks).collect();
                 screen::may_pass(frame.source, &origins, to)
             };
-            let passes = is_addressed && (!has_limits || is_open());
+            let passes = is_addressed
+                && (!has_limits || is_open())
+                && to.rules.may_receive(frame, &self.table);
             stopped += u64::from(!passes);
             passes
         })?;

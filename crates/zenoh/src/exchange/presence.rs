@@ -69,6 +69,19 @@ impl Exchange {
         }
     }
 
+    /// A component of this side uses an id for which a bridge speaks: the bridge loses it.
+    pub(super) fn take_back(&mut self, now: Instant, component: JausId) {
+        let Some((owner, closed)) = self.remotes.take_back(component) else {
+            return;
+        };
+        if let Some(session) = closed {
+            self.arrivals.close(session);
+        }
+        self.owners.end(|(id, _)| *id == component);
+        let key = self.token_of(component, owner);
+        self.note_intruder(now, &key, component, owner);
+    }
+
     /// A component is no longer one of this side. It belongs to a bridge that has declared its token.
     pub(super) fn release(&mut self, now: Instant, component: JausId) {
         if let Some(next) = self.remotes.release(component) {

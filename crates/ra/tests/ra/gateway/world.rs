@@ -299,9 +299,15 @@ impl World {
         }
         for peer in &mut self.jaus {
             while let Some(message) = peer.stack.poll_transmit() {
-                if peer.up {
-                    sent.push(message);
+                if !peer.up {
+                    continue;
                 }
+                // The gateway's node tells it so.
+                if self.attached.contains(&message.source) {
+                    let from = address(99).into();
+                    self.gateway.handle_conflict(self.now, message.source, from);
+                }
+                sent.push(message);
             }
             while let Some(event) = peer.stack.poll_event() {
                 peer.events.push(event);

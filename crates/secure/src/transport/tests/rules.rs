@@ -2,9 +2,11 @@
 
 use jaus::codec::Message as _;
 use jaus::messages::core::{
-    ConfirmControl, QueryIdentification, RejectControl, RequestControl, SetEmergency,
+    ConfirmControl, Event, QueryIdentification, RejectControl, RequestControl, SetEmergency,
 };
-use jaus::messages::mobility::{QueryVelocityState, SetWrenchEffort};
+use jaus::messages::mobility::{
+    QueryVelocityState, ReportGlobalPose, ReportVelocityState, SetWrenchEffort,
+};
 use jaus::rights::{Decision, Refusal, Unaccepted, Verdict};
 use jaus::wire::{DataControl, Flags};
 
@@ -154,6 +156,35 @@ fn rules_that_change_apply_to_running_sessions() {
     network.run(SECOND);
     assert_eq!(network.hosts[0].received, [wrench]);
     assert!(network.hosts[0].closed.is_empty(), "the session remains");
+}
+
+#[test]
+fn what_except_adds_ends_the_reports_of_a_subscription_that_stands() {
+    let (mut network, trust, keys) = vehicle_with_rules("");
+    let pose = ReportGlobalPose::default().encode().unwrap();
+    let event = Event {
+        event_id: 1,
+        sequence_number: 1,
+        report_message: pose.clone(),
+    };
+    let reports = [
+        raw("101.1.1", "60.1.1", &pose),
+        message("101.1.1", "60.1.1", &event),
+        message("101.1.1", "60.1.1", &ReportVelocityState::default()),
+    ];
+    for datagram in &reports {
+        network.send(0, Priority::Standard, datagram);
+    }
+    network.run(SECOND);
+    assert_eq!(network.hosts[1].received, reports);
+    replace_rules(&trust[0], &keys[1], "except=GlobalPoseSensor");
+    network.run(SECOND);
+    for datagram in &reports {
+        network.send(0, Priority::Standard, datagram);
+    }
+    network.run(SECOND);
+    assert_eq!(network.hosts[1].received[3..], reports[2..]);
+    assert_eq!(network.count(0, Counter::Separated), 2);
 }
 
 #[test]

@@ -177,7 +177,7 @@ fn who_squats_an_id_is_named_once_and_frees_it_when_it_goes() {
 #[test]
 fn who_squats_an_id_is_named_on_the_side_of_the_id_too() {
     let now = Instant::now();
-    let mut here = bridge(HERE, &[]);
+    let mut here = bridge(HERE, &["60 control=127"]);
     announce_by(SQUATTER, now, &mut here, OPERATOR);
     let token = bridge(SQUATTER, &[]).token_key(OPERATOR);
     here.handle_local(now, OPERATOR, now);
@@ -187,6 +187,46 @@ fn who_squats_an_id_is_named_on_the_side_of_the_id_too() {
     here.handle_token(now, &token, false);
     here.handle_local(now, OPERATOR, now);
     assert_eq!(here.poll_command(now), Some(Command::Announce(OPERATOR)));
+}
+
+#[test]
+fn a_client_that_may_only_look_loses_an_id_at_once_when_this_side_uses_it() {
+    let now = Instant::now();
+    let mut here = bridge(HERE, &[]);
+    announce_by(SQUATTER, now, &mut here, OPERATOR);
+    // A second id, so that its session goes on.
+    announce_by(SQUATTER, now, &mut here, JausId::new(60, 1, 2));
+    let (key, octets) = sample(&frame(OPERATOR, DRIVER, QUERY), SQUATTER);
+    here.handle_sample(now, &key, &octets);
+    let session = session_of(&mut here);
+    let answer = to_session(session, &[frame(DRIVER, OPERATOR, QUERY)]);
+    here.transmit(now, &answer);
+    assert_eq!(samples(now, &mut here).len(), 1, "nobody else uses the id");
+
+    let token = bridge(SQUATTER, &[]).token_key(OPERATOR);
+    here.handle_local(now, OPERATOR, now);
+    let commands: Vec<_> = std::iter::from_fn(|| here.poll_command(now)).collect();
+    assert!(commands.contains(&Command::Announce(OPERATOR)));
+    assert!(
+        commands.contains(&Command::Identify(token.clone())),
+        "named"
+    );
+    here.handle_sample(now, &key, &octets);
+    assert!(arrivals(&mut here).is_empty());
+    // What is for the id stays on this side, also while its component is silent for a while.
+    let silent = now + LOCAL_FOR;
+    here.expire(silent);
+    for when in [now, silent] {
+        here.transmit(when, &answer);
+        assert!(samples(when, &mut here).is_empty());
+        here.handle_token(when, &token, true);
+        here.handle_sample(when, &key, &octets);
+        assert!(arrivals(&mut here).is_empty());
+    }
+    let free = silent + ID_HELD;
+    here.expire(free);
+    here.handle_sample(free, &key, &octets);
+    assert_eq!(arrivals(&mut here).len(), 1, "the id is free");
 }
 
 #[test]
