@@ -15,9 +15,11 @@ export class Account {
   role = null;
   #activeAt = 0;
   #entered;
+  #pass;
 
   /** Calls `entered` when a user has logged in, and `active` when the user does something. */
-  constructor(entered, active) {
+  constructor(entered, active, pass) {
+    this.#pass = pass;
     this.#entered = entered;
     get("login-form").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -50,6 +52,7 @@ export class Account {
   async check() {
     const answer = await request("session");
     const session = await answer.json();
+    await this.#pass.meet(session.run);
     this.users = session.users === true;
     this.user = typeof session.user === "string" ? plain(session.user, 32) : null;
     this.role = plain(session.role, 16);

@@ -10,6 +10,7 @@ use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::devices::{DeviceId, Devices};
+use super::guard;
 use super::logins::{Ending, Login, LoginId, Logins};
 use super::trail::Trail;
 use super::visitor::Visitor;
@@ -34,12 +35,13 @@ impl Gate {
     /// The sender of a request, with the role that the request shows; `None` for one who has to
     /// log in first.
     pub(super) fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
-        let visitor = |role| Visitor::new(OPERATOR, address, None, role);
+        let from = (address, guard::host(headers).unwrap_or_default());
+        let visitor = |role| Visitor::new(OPERATOR, from, None, role);
         match self {
             Self::Open => Some(visitor(Some(UserRole::Drive))),
             Self::Token { to_read: false, .. } => Some(visitor(Some(UserRole::Observe))),
             Self::Token { to_read: true, .. } => Some(visitor(None)),
-            Self::Users(gate) => gate.visitor(headers, address),
+            Self::Users(gate) => gate.visitor(headers, from),
         }
     }
 
@@ -149,17 +151,12 @@ impl UserGate {
         self.logins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
+    fn visitor(&self, headers: &HeaderMap, from: (SocketAddr, &str)) -> Option<Visitor> {
         let secret = cookie(headers, &self.cookie)?;
         let logins = self.logins();
         let login = logins.find(secret)?;
         let name = &login.user.name;
-        Some(Visitor::new(
-            name,
-            address,
-            Some(login.id),
-            Some(login.role()),
-        ))
+        Some(Visitor::new(name, from, Some(login.id), Some(login.role())))
     }
 
     /// The device of a request, if the user has logged in from it before.

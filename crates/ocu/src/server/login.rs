@@ -38,6 +38,8 @@ struct Credentials {
 struct Session {
     /// Whether the page has users, who must log in.
     users: bool,
+    /// The run of the station, for which a page makes its ticket.
+    run: String,
     user: Option<String>,
     role: Option<UserRole>,
 }
@@ -75,6 +77,7 @@ pub(super) async fn session(
     let visitor = users.and_then(|_| shared.admission.gate.visitor(&headers, address));
     let session = Session {
         users: users.is_some(),
+        run: shared.admission.proofs.run().to_owned(),
         user: visitor.as_ref().map(|it| it.user.to_string()),
         role: visitor.as_ref().and_then(Visitor::role),
     };

@@ -14,10 +14,10 @@ use serde_json::{Map, Value};
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
-use super::Shared;
 use super::bounds::FRAMES;
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
+use super::{Admission, Shared};
 use crate::answer::Said as Answer;
 use crate::changes::changes;
 use crate::orders::{
@@ -62,6 +62,20 @@ pub(super) struct Introduction {
     /// The number of the same page's previous connection, and the secret that came with it.
     replaces: Option<u64>,
     secret: Option<String>,
+    /// What the page wants to be answered by one who knows its token.
+    nonce: Option<String>,
+    #[serde(skip)]
+    pub(super) answer: Option<Token>,
+}
+
+impl Introduction {
+    /// Answers the nonce of a visitor who has shown the token or a ticket.
+    pub(super) fn answer(&mut self, shared: &Shared, visitor: &Visitor) {
+        let Admission { gate, proofs, .. } = &shared.admission;
+        let token = gate.token().filter(|_| visitor.may(UserRole::Drive));
+        let asked = token.zip(self.nonce.as_deref());
+        self.answer = asked.and_then(|(token, nonce)| proofs.answer(token, &visitor.host, nonce));
+    }
 }
 
 /// The link to the page. The reader notes confirmations, and the writer the states that it sends.
@@ -125,6 +139,7 @@ pub(super) async fn serve(
     let writer = Writer {
         page,
         secret,
+        answer: introduction.answer,
         shared: &shared,
         visitor: &visitor,
         link: &link,
@@ -489,6 +504,8 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
 struct Writer<'s> {
     page: PageId,
     secret: Option<Token>,
+    /// By it the page knows this station.
+    answer: Option<Token>,
     shared: &'s Shared,
     visitor: &'s Visitor,
     link: &'s SharedLink,
@@ -590,6 +607,7 @@ impl Writer<'_> {
             version: VERSION,
             page: self.page.0,
             secret: self.secret.as_ref().map(Token::reveal),
+            answer: self.answer.as_ref().map(Token::reveal),
             // Most pages have shown it with their first request.
             token_needed: admission.gate.token().is_some() && !self.visitor.may(UserRole::Drive),
             watch: admission.gate.lets_watch(),

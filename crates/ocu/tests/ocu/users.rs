@@ -174,8 +174,10 @@ async fn without_a_login_nothing_is_shown_but_the_form() {
         assert_eq!(guarded.page_status(cookie).await, 401);
         let (head, _) = guarded.get("/map/101/1", cookie).await;
         assert!(head.starts_with("http/1.1 401"), "{head}");
-        let (_, session) = guarded.get("/session", cookie).await;
-        assert_eq!(session, json!({"users": true, "user": null, "role": null}));
+        let (_, mut session) = guarded.get("/session", cookie).await;
+        assert_eq!(session["run"].take().as_str().unwrap().len(), 32);
+        let nobody = json!({"users": true, "run": null, "user": null, "role": null});
+        assert_eq!(session, nobody);
     }
     let (head, _) = guarded.get("/", "").await;
     assert!(head.starts_with("http/1.1 200"), "{head}");
