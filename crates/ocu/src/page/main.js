@@ -82,7 +82,7 @@ link.addEventListener("barred", () => {
 });
 link.addEventListener("doubt", () => {
   say(get("token-text"), STRANGER);
-  say(get("token-no"), "Forget the token");
+  say(get("token-no"), "Forget mine");
   show(get("token-no"), true);
   openTokenSheet();
 });
@@ -198,7 +198,7 @@ function showFleet() {
 // The token.
 
 const STRANGER =
-  "The program at this address does not prove that it has your token, and was told nothing. Either the station has another token now: enter it. Or another program has taken its place: see the address that the station printed.";
+  "The program at this address does not prove that it knows your token or login, and was told nothing. Either the station has another token now: enter it. Or another program has taken its place: see the address that the station printed.";
 
 const watching = () => sessionStorage.getItem("jaus-watch") === "yes";
 

@@ -1,5 +1,5 @@
-// What the page shows to the station instead of its token, and how it knows the station: each proves that it knows the
-// token, which is not sent. Whoever has taken the station's port gets nothing that is of use anywhere.
+// What the page shows to the station instead of its token or the secret of its user's session, and how it knows the
+// station: each proves that it knows the secret, which is not sent. Whoever has taken the station's port gets nothing that is of use anywhere.
 //
 // Of the token a key for this address remains, which the browser keeps for the pages of this address and shows to none,
 // also not to one that another program serves here. A browser that offers pages no cryptography, as for HTTP from

@@ -347,28 +347,23 @@ fn of_page(upgrade: WebSocketUpgrade, subprotocols: &'static [&str]) -> WebSocke
 /// station does not choose one of its subprotocols. It can still stop vehicles.
 const SUBPROTOCOL: &str = "jaus.4";
 const OLDER_SUBPROTOCOL: &str = "jaus";
-const TOKEN_SUBPROTOCOL: &str = "token.";
-
-/// The token that a page shows as it opens a WebSocket.
-fn token_of_handshake(headers: &HeaderMap) -> Option<&str> {
-    let named = headers.get_all(header::SEC_WEBSOCKET_PROTOCOL).iter();
-    let mut named = named
-        .filter_map(|it| it.to_str().ok())
-        .flat_map(|it| it.split(','));
-    named.find_map(|it| it.trim().strip_prefix(TOKEN_SUBPROTOCOL))
-}
 
 impl Shared {
     fn attempts(&self) -> MutexGuard<'_, Attempts> {
         self.attempts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The sender of a request; `None` for one who has to log in first.
+    fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
+        let Admission { gate, proofs, .. } = &self.admission;
+        gate.visitor(headers, address, proofs)
+    }
+
     /// Whether the shown token is right, or the ticket of one who has it. Wrong ones are counted, and answered late: with at least 16
     /// characters and the limits of connections, that is enough, and no guess makes others wait.
     async fn admits(&self, visitor: &Visitor, shown: &str) -> bool {
         let Admission { gate, proofs, .. } = &self.admission;
-        let is_right =
-            |token: &Token| token.is(shown) || proofs.is_ticket(token, &visitor.host, shown);
+        let is_right = |token: &Token| proofs.is_shown(token, &visitor.host, shown);
         if gate.token().is_none_or(is_right) {
             return true;
         }
@@ -387,9 +382,8 @@ impl Shared {
         headers: &HeaderMap,
         places: [&Places; 2],
     ) -> Result<Visitor, (StatusCode, String)> {
-        let gate = &self.admission.gate;
         let stranger = || (StatusCode::UNAUTHORIZED, "log in first\n".to_owned());
-        let visitor = gate.visitor(headers, address).ok_or_else(stranger)?;
+        let visitor = self.visitor(headers, address).ok_or_else(stranger)?;
         match self.seat(&visitor, headers, places).await {
             Ok(()) => Ok(visitor),
             Err(why) => Err((StatusCode::SERVICE_UNAVAILABLE, why + "\n")),
@@ -411,7 +405,7 @@ impl Shared {
             visitor.settle(Some(self.place(places, visitor)?));
             return Ok(());
         }
-        match token_of_handshake(headers) {
+        match gate::shown(headers) {
             Some(shown) if self.admits(visitor, shown).await => self.trust(visitor, places),
             // Hello says that the token is needed, so that the page asks the user for another.
             _ => {
@@ -474,15 +468,13 @@ impl Shared {
 
     /// Checks that a request may read vehicle data.
     async fn check_reader(&self, headers: &HeaderMap, address: SocketAddr) -> Result<(), Refusal> {
-        let Some(visitor) = self.admission.gate.visitor(headers, address) else {
+        let Some(visitor) = self.visitor(headers, address) else {
             return Err((StatusCode::UNAUTHORIZED, "log in first\n"));
         };
         if visitor.may(UserRole::Observe) {
             return Ok(());
         }
-        let shown = headers.get(header::AUTHORIZATION);
-        let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
-        match shown {
+        match gate::shown(headers) {
             Some(shown) if self.admits(&visitor, shown).await => Ok(()),
             _ => {
                 let words = "this requires the token: send Authorization: Bearer TOKEN\n";

@@ -41,8 +41,12 @@ impl Proofs {
         self.run.reveal()
     }
 
-    /// Whether a page of this host has shown its ticket.
-    pub(super) fn is_ticket(&self, secret: &Token, host: &str, shown: &str) -> bool {
+    /// Whether a page of this host has shown its ticket, or the secret itself, as scripts do.
+    pub(super) fn is_shown(&self, secret: &Token, host: &str, shown: &str) -> bool {
+        secret.is(shown) || self.is_ticket(secret, host, shown)
+    }
+
+    fn is_ticket(&self, secret: &Token, host: &str, shown: &str) -> bool {
         let ticket = self.prove(secret, host, &format!("page {}", self.run()));
         ticket.is_some_and(|it| it.is(shown))
     }

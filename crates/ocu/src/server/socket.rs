@@ -72,9 +72,8 @@ impl Introduction {
     /// Answers the nonce of a visitor who has shown the token or a ticket.
     pub(super) fn answer(&mut self, shared: &Shared, visitor: &Visitor) {
         let Admission { gate, proofs, .. } = &shared.admission;
-        let token = gate.token().filter(|_| visitor.may(UserRole::Drive));
-        let asked = token.zip(self.nonce.as_deref());
-        self.answer = asked.and_then(|(token, nonce)| proofs.answer(token, &visitor.host, nonce));
+        let asked = gate.secret_of(visitor).zip(self.nonce.as_deref());
+        self.answer = asked.and_then(|(it, nonce)| proofs.answer(&it, &visitor.host, nonce));
     }
 }
 
