@@ -9,15 +9,15 @@ use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use jaus_limits::Bucket;
-use serde::Deserialize;
 use serde_json::{Map, Value};
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
+use super::Shared;
 use super::bounds::FRAMES;
+use super::introduction::Introduction;
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
-use super::{Admission, Shared};
 use crate::answer::Said as Answer;
 use crate::changes::changes;
 use crate::orders::{
@@ -53,29 +53,6 @@ const SESSION_ENDED: u16 = 4001;
 const REFUSAL: Duration = Duration::from_secs(1);
 /// Interval of the frames about the links.
 const LINK: Duration = Duration::from_secs(1);
-
-/// What a page says when it connects.
-#[derive(Debug, Default, Deserialize)]
-pub(super) struct Introduction {
-    /// The vehicle to show.
-    vehicle: Option<u16>,
-    /// The number of the same page's previous connection, and the secret that came with it.
-    replaces: Option<u64>,
-    secret: Option<String>,
-    /// What the page wants to be answered by one who knows its token.
-    nonce: Option<String>,
-    #[serde(skip)]
-    pub(super) answer: Option<Token>,
-}
-
-impl Introduction {
-    /// Answers the nonce of a visitor who has shown the token or a ticket.
-    pub(super) fn answer(&mut self, shared: &Shared, visitor: &Visitor) {
-        let Admission { gate, proofs, .. } = &shared.admission;
-        let asked = gate.secret_of(visitor).zip(self.nonce.as_deref());
-        self.answer = asked.and_then(|(it, nonce)| proofs.answer(&it, &visitor.host, nonce));
-    }
-}
 
 /// The link to the page. The reader notes confirmations, and the writer the states that it sends.
 #[derive(Default)]

@@ -21,7 +21,8 @@ use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 
 use super::Shared;
 use super::bounds::FRAMES;
-use super::socket::{Introduction, Parting, supervise};
+use super::introduction::Introduction;
+use super::socket::{Parting, supervise};
 use super::visitor::Visitor;
 use crate::orders::{StopOrder, StopReply, StopTarget, TakenStop};
 use crate::press::Press;
