@@ -57,3 +57,5 @@ pub use group::{
 pub use holder::Holder;
 pub use interface::{Available, Interface, Interfaces, Ip, Place};
 pub use slab::Slab;
+pub use socket_table::is_of_another_user;
+pub(crate) use socket_table::is_ours;

@@ -1,5 +1,5 @@
-//! Linux's table of UDP sockets, `/proc/net/udp`: the holder of a port, and the kernel's drop
-//! counts.
+//! Linux's tables of sockets. `/proc/net/udp`: the holder of a port, and the kernel's drop counts.
+//! `/proc/net/tcp`: whose process is at the other end of a connection within this host.
 //!
 //! Other systems have no such table, so nothing is found there.
 
@@ -55,6 +55,52 @@ pub(super) fn inode_of(socket: &impl std::os::fd::AsRawFd) -> Option<u64> {
 #[cfg(not(unix))]
 pub(super) fn inode_of<S>(_: &S) -> Option<u64> {
     None
+}
+
+/// Whether a TCP connection from `peer` to `here` comes from a process of this host that is neither root's nor of the
+/// user of this process. Every user reaches a port of loopback. Systems other than Linux do not tell.
+#[must_use]
+pub fn is_of_another_user(peer: SocketAddr, here: SocketAddr) -> bool {
+    let tables = ["/proc/net/tcp", "/proc/net/tcp6"].map(fs::read_to_string);
+    let user = tables
+        .iter()
+        .flatten()
+        .find_map(|table| user_of(table, peer, here));
+    match user {
+        Some(uid) => !is_ours(uid),
+        // Another host, or a process that has closed its end.
+        None => cfg!(target_os = "linux") && peer.ip().to_canonical().is_loopback(),
+    }
+}
+
+/// Whether it is root, or the user of this process.
+pub(crate) fn is_ours(uid: u32) -> bool {
+    #[cfg(unix)]
+    return uid == 0 || uid == rustix::process::geteuid().as_raw();
+    #[cfg(not(unix))]
+    return uid == 0;
+}
+
+/// The user of the process at one end of a connection: once it has closed its socket, the table names root.
+fn user_of(table: &str, its: SocketAddr, other: SocketAddr) -> Option<u32> {
+    const ESTABLISHED: &str = "01";
+    let is = |column: &str, wanted: SocketAddr| {
+        let end = column.split_once(':').and_then(|(ip, port)| {
+            Some((
+                address(ip)?.to_canonical(),
+                u16::from_str_radix(port, 16).ok()?,
+            ))
+        });
+        end == Some((wanted.ip().to_canonical(), wanted.port()))
+    };
+    table.lines().skip(1).find_map(|line| {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let [_, from, to, state, _, _, _, uid, ..] = columns[..] else {
+            return None;
+        };
+        let is_it = state == ESTABLISHED && is(from, its) && is(to, other);
+        is_it.then(|| uid.parse().ok()).flatten()
+    })
 }
 
 fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
@@ -128,6 +174,24 @@ garbage
             .map(|e| e.inode)
             .collect();
         assert_eq!(inodes, [66, 67, 77, 4242]);
+    }
+
+    #[test]
+    fn the_user_at_the_other_end_of_a_connection_is_found_until_it_closes() {
+        const TABLE: &str = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode
+   0: 0100007F:223D 0100007F:9C40 01 00000000:00000000 00:00000000 00000000  1000        0 11 1 0 20 4 30 10 -1
+   1: 0100007F:9C40 0100007F:223D 01 00000000:00000000 00:00000000 00000000 65534        0 12 1 0 20 4 30 10 -1
+   2: 0100007F:9C41 0100007F:223D 05 00000000:00000000 00:00000000 00000000     0        0 0 1 0 20 4 30 10 -1
+   3: 0000000000000000FFFF00000100007F:9C42 0000000000000000FFFF00000100007F:223D 01 00000000:00000000 00:00000000 00000000 1001 0 13 1
+";
+        let user = |port: u16| {
+            let end = |port: u16| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+            user_of(TABLE, end(port), end(8765))
+        };
+        assert_eq!(user(40_000), Some(65_534));
+        assert_eq!(user(40_001), None, "it has no user any more");
+        assert_eq!(user(40_002), Some(1001));
+        assert_eq!(user(40_003), None);
     }
 
     #[test]

@@ -19,6 +19,8 @@ pub(super) enum Said<'a> {
         page: u64,
         /// What the page shows when it connects again in place of this connection.
         secret: Option<&'a str>,
+        /// The answer to the page's nonce.
+        answer: Option<&'a str>,
         token_needed: bool,
         /// Whether a page without the token may look, and stop vehicles.
         watch: bool,

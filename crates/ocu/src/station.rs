@@ -2,12 +2,12 @@
 
 use std::convert::Infallible;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tokio::net::TcpListener;
 
 use super::base_map::BaseMap;
-use super::server::{Admission, Devices, Gate, MemoryBrowsers, Server, Trail, UserGate};
+use super::server::{Admission, Devices, Gate, MemoryBrowsers, Proofs, Server, Trail, UserGate};
 use super::session::Session;
 use super::tls::Tls;
 use super::token::Token;
@@ -42,7 +42,7 @@ pub struct Station {
     /// Address of the page.
     pub listen: Listen,
     /// The token an operator must show before the vehicle obeys. Without one, one is generated, and
-    /// kept in [`state`](Self::state).
+    /// kept in [`state`](Self::state) unless another program has the usual port.
     pub token: Option<Token>,
     /// Whether looking and stopping also require the token.
     pub token_to_read: bool,
@@ -118,26 +118,34 @@ impl Station {
     /// If listening at the address fails, another address than loopback would be unprotected, or
     /// there is no usable token.
     pub async fn open(mut self) -> Result<OpenStation, PartError> {
-        let listener = listen(self.listen).await?;
-        let address = listener
-            .local_addr()
-            .map_err(|error| PartError::Broken(error.to_string()))?;
+        let (listener, is_moved) = listen(self.listen).await?;
+        let address = listener.local_addr().map_err(broken)?;
+        if is_moved {
+            tracing::warn!(
+                "another program has port {}: the page is at {address}; a token that was kept is not used there",
+                Listen::PORT
+            );
+        }
         if self.unprotected && !address.ip().is_loopback() {
             return Err(PartError::Broken(format!(
                 "{address} is reached from other hosts: it requires a token or users"
             )));
         }
         let generates_token = self.token.is_none() && self.users.is_none() && !self.unprotected;
+        // Whoever has the usual port may wait there for the kept token.
+        let folder = self.state.as_ref().filter(|_| generates_token && !is_moved);
+        let token_file = folder.map(|it| it.join(TOKEN_FILE));
         if generates_token {
-            let token = match &self.state {
-                Some(folder) => Token::keep(&folder.join(TOKEN_FILE)),
+            let token = match &token_file {
+                Some(file) => Token::keep(file),
                 None => Token::generate(),
             };
-            self.token = Some(token.map_err(|error| PartError::Broken(error.to_string()))?);
+            self.token = Some(token.map_err(broken)?);
         }
         Ok(OpenStation {
             station: self,
             generates_token,
+            token_file,
             listener,
             address,
         })
@@ -192,10 +200,13 @@ impl Station {
                 Gate::Open
             }
         };
+        let is_secure = self.tls.is_some();
+        let proofs = Proofs::new(address.port(), is_secure, &self.hosts).map_err(broken)?;
         let admission = Admission {
             operator: component.id(),
             authority: self.authority,
             gate,
+            proofs,
             trail,
             hosts: self.hosts,
             base_map: self.base_map,
@@ -215,6 +226,8 @@ pub struct OpenStation {
     station: Station,
     /// Whether the token was generated, at this start or at an earlier one.
     generates_token: bool,
+    /// The file with the generated token, if it is kept.
+    token_file: Option<PathBuf>,
     listener: TcpListener,
     address: SocketAddr,
 }
@@ -246,10 +259,8 @@ impl OpenStation {
 
     /// The file with the generated token, if it is kept.
     #[must_use]
-    pub fn token_file(&self) -> Option<PathBuf> {
-        let folder = self.station.state.as_ref();
-        let file = folder.map(|it| it.join(TOKEN_FILE));
-        file.filter(|_| self.generates_token)
+    pub fn token_file(&self) -> Option<&Path> {
+        self.token_file.as_deref()
     }
 
     fn urls_with(&self, token: &str) -> Vec<String> {
@@ -308,11 +319,16 @@ impl Part for OpenStation {
     }
 }
 
+fn broken(error: impl std::fmt::Display) -> PartError {
+    PartError::Broken(error.to_string())
+}
+
 fn server_has_ended() -> PartError {
     PartError::Broken("the page's server has ended".to_owned())
 }
 
-async fn listen(listen: Listen) -> Result<TcpListener, PartError> {
+/// Listens, and says whether the usual port belongs to another program.
+async fn listen(listen: Listen) -> Result<(TcpListener, bool), PartError> {
     let broken = |address: SocketAddr, error: std::io::Error| {
         PartError::Broken(format!(
             "cannot serve the page at {address} (--listen): {error}; choose another address or port"
@@ -321,14 +337,15 @@ async fn listen(listen: Listen) -> Result<TcpListener, PartError> {
     match listen {
         Listen::At(address) => {
             let listener = TcpListener::bind(address).await;
-            listener.map_err(|error| broken(address, error))
+            let listener = listener.map_err(|error| broken(address, error))?;
+            Ok((listener, false))
         }
         Listen::Loopback => {
             let mut port = Listen::PORT;
             loop {
                 let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
                 match TcpListener::bind(address).await {
-                    Ok(listener) => return Ok(listener),
+                    Ok(listener) => return Ok((listener, port != Listen::PORT)),
                     Err(_) if port < Listen::PORT + Listen::PORTS => port += 1,
                     Err(error) => return Err(broken(address, error)),
                 }

@@ -121,7 +121,12 @@ impl Token {
     pub fn generate() -> Result<Self, TokenError> {
         let mut octets = [0; Self::RANDOM];
         getrandom::fill(&mut octets).map_err(TokenError::NoRandomness)?;
-        Ok(Self(octets.iter().map(|it| format!("{it:02x}")).collect()))
+        Ok(Self::of_octets(&octets))
+    }
+
+    /// Octets as hexadecimal digits.
+    pub(crate) fn of_octets(octets: &[u8]) -> Self {
+        Self(octets.iter().map(|it| format!("{it:02x}")).collect())
     }
 
     /// Compares with a shown token, in constant time for equal lengths.

@@ -2,6 +2,7 @@
 
 use super::Refusal;
 use crate::address::JausId;
+use crate::link::is_ours;
 use crate::link::local::record::Reason;
 use crate::node::LocalUser;
 use crate::rights::Rules;
@@ -39,14 +40,6 @@ pub(super) async fn rights_of(
         return Err((Reason::User, why));
     }
     Ok(Some(user.rules().clone()))
-}
-
-/// Whether it is root, or the user of this process.
-fn is_ours(uid: u32) -> bool {
-    #[cfg(unix)]
-    return uid == 0 || uid == rustix::process::geteuid().as_raw();
-    #[cfg(not(unix))]
-    return uid == 0;
 }
 
 /// The name of a user. It is looked up at each attachment, because users come and go.

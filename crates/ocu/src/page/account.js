@@ -15,9 +15,11 @@ export class Account {
   role = null;
   #activeAt = 0;
   #entered;
+  #pass;
 
   /** Calls `entered` when a user has logged in, and `active` when the user does something. */
-  constructor(entered, active) {
+  constructor(entered, active, pass) {
+    this.#pass = pass;
     this.#entered = entered;
     get("login-form").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -48,13 +50,20 @@ export class Account {
 
   /** Asks the station who is logged in; resolves to whether the page may connect. */
   async check() {
-    const answer = await request("session");
-    const session = await answer.json();
+    const shown = this.#pass.shown;
+    let session = await this.#session();
+    await this.#pass.meet(session.run);
+    // What the page has to show depends on the station's run.
+    if (session.users && this.#pass.shown !== shown) session = await this.#session();
     this.users = session.users === true;
     this.user = typeof session.user === "string" ? plain(session.user, 32) : null;
     this.role = plain(session.role, 16);
     this.#render();
     return !this.missing;
+  }
+
+  async #session() {
+    return (await this.#request("session")).json();
   }
 
   #render() {
@@ -76,7 +85,7 @@ export class Account {
     const [name, password] = [get("login-name"), get("login-password")];
     const body = JSON.stringify({ name: name.value.trim(), password: password.value });
     get("login-submit").disabled = true;
-    const reason = await refusal("login", body);
+    const reason = await this.#refusal("login", body, async (answer) => this.#pass.use(plain((await answer.json()).secret, 64)));
     get("login-submit").disabled = false;
     password.value = "";
     say(get("login-text"), reason === null ? "" : `Not logged in: ${reason}`);
@@ -85,8 +94,9 @@ export class Account {
   }
 
   async #logOut() {
-    const reason = await refusal("logout");
+    const reason = await this.#refusal("logout");
     if (reason !== null) return toast("bad", reason);
+    await this.#pass.forget();
     // The page forgets what it has shown.
     location.reload();
   }
@@ -113,7 +123,7 @@ export class Account {
 
   async #listSessions() {
     try {
-      const answer = await request("sessions");
+      const answer = await this.#request("sessions");
       if (!answer.ok) throw new Error(await answer.text());
       const sessions = list(await answer.json(), 1024);
       get("sessions").replaceChildren(...sessions.map((session) => this.#entry(session)));
@@ -129,23 +139,28 @@ export class Account {
     if (own) return make("li", {}, make("span", {}, `${text} (this page)`));
     const end = make("button", { type: "button", className: "warn", "aria-label": `End the session of ${name}` }, "End");
     end.addEventListener("click", async () => {
-      const reason = await refusal(`sessions/${Number(id)}/end`);
+      const reason = await this.#refusal(`sessions/${Number(id)}/end`);
       if (reason !== null) toast("bad", reason);
       this.#listSessions();
     });
     return make("li", {}, make("span", {}, text), end);
   }
-}
 
-const request = (path, options) =>
-  fetch(path, { cache: "no-store", signal: AbortSignal.timeout(PATIENCE), ...options });
+  #request(path, options) {
+    const { shown } = this.#pass;
+    const headers = shown ? { Authorization: `Bearer ${shown}` } : {};
+    return fetch(path, { cache: "no-store", signal: AbortSignal.timeout(PATIENCE), headers, ...options });
+  }
 
-/** Posts; resolves to null if it was accepted, or to the reason why not. */
-async function refusal(path, body) {
-  try {
-    const answer = await request(path, { method: "POST", body });
-    return answer.ok ? null : plain(await answer.text(), 200) || `status ${answer.status}`;
-  } catch {
-    return "no connection to the operator's node";
+  /** Posts; resolves to null if it was accepted, or to the reason why not. */
+  async #refusal(path, body, accepted = () => {}) {
+    try {
+      const answer = await this.#request(path, { method: "POST", body });
+      if (!answer.ok) return plain(await answer.text(), 200) || `status ${answer.status}`;
+      await accepted(answer);
+      return null;
+    } catch {
+      return "no connection to the operator's node";
+    }
   }
 }

@@ -19,7 +19,6 @@ const DRAWN = 500;
 const UNSENT = "No connection: not sent.";
 const UNANSWERED = "No answer from the operator's node.";
 const LOST = "The connection was lost before an answer arrived.";
-const KEY = "jaus-token";
 const VEHICLE = "jaus-vehicle";
 
 export class Link extends EventTarget {
@@ -32,7 +31,8 @@ export class Link extends EventTarget {
   #stateAt = 0;
   #ids = 0;
   #waiting = new Map();
-  #token = takeToken();
+  /** What the page shows to the station. */
+  #pass;
   /** The vehicle that the page shows: what is asked is meant for it. */
   #vehicle = number(Number(sessionStorage.getItem(VEHICLE) ?? NaN));
   /** The number of this page at the station; null before the first connection. */
@@ -49,12 +49,15 @@ export class Link extends EventTarget {
   #tries = 0;
   /** Whether the page may not connect before the user has logged in. */
   #barred = false;
+  /** How often in a row the other side did not prove to be the station: it may have restarted meanwhile. */
+  #doubts = 0;
   /** Whether the server's first frame has arrived and, if it requires a token, it has checked ours. */
   settled = false;
 
-  constructor(admit) {
+  constructor(admit, pass) {
     super();
     this.#admit = admit;
+    this.#pass = pass;
   }
 
   /** `barred`, `connecting`, `live`, `stale` or `lost`. */
@@ -101,14 +104,19 @@ export class Link extends EventTarget {
     return Math.max(0, this.#retryAt - performance.now());
   }
 
+  /** The token or what stands for it. */
   get token() {
-    return this.#token;
+    return this.#pass.shown;
   }
 
-  /** The subprotocols of a WebSocket: they show the token, so that the station takes the page for one of
-   * those that may drive from the start. */
-  get protocols() {
-    return this.#token ? ["jaus.4", `token.${this.#token}`] : ["jaus.4"];
+  /** Opens a WebSocket. Its subprotocols show the token, so that the station takes the page for one of those that may
+   * drive from the start, and the query asks the station to prove that it is the one; the proof is awaited in `answer`. */
+  socketTo(path, query = new URLSearchParams()) {
+    const { shown, nonce, answer } = this.#pass;
+    if (nonce) query.set("nonce", nonce);
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    const protocols = shown ? ["jaus.4", `token.${shown}`] : ["jaus.4"];
+    return Object.assign(new WebSocket(`${scheme}//${location.host}${path}?${query}`, protocols), { answer });
   }
 
   start() {
@@ -156,14 +164,16 @@ export class Link extends EventTarget {
 
   /** Uses a token from now on; resolves like `ask`. */
   async useToken(token) {
-    const reason = await this.ask({ type: "token", token });
-    if (reason === null) {
-      this.#token = token;
-      sessionStorage.setItem(KEY, token);
-    } else if (token === this.#token && ![UNSENT, UNANSWERED, LOST].includes(reason)) {
-      this.#token = "";
-      sessionStorage.removeItem(KEY);
+    if (!(await this.#pass.use(token))) return "it is no token of a station";
+    if (!this.open) {
+      this.#doubts = 1;
+      this.restart();
+      return null;
     }
+    const reason = await this.ask({ type: "token", token: this.token });
+    // The station has yet to prove that it is the one.
+    if (reason === null && this.#pass.answer) this.restart();
+    else if (reason !== null && ![UNSENT, UNANSWERED, LOST].includes(reason)) await this.#pass.forget();
     return reason;
   }
 
@@ -190,7 +200,6 @@ export class Link extends EventTarget {
     }
     if (number !== this.#tries) return;
     if (this.#barred) return this.#emit("barred", null);
-    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const query = new URLSearchParams();
     if (this.#vehicle !== null) query.set("vehicle", this.#vehicle);
     // The station may not have noticed yet that the connection before is gone.
@@ -198,7 +207,7 @@ export class Link extends EventTarget {
       query.set("replaces", this.#page);
       query.set("secret", this.#secret);
     }
-    const socket = new WebSocket(`${scheme}//${location.host}/ws?${query}`, this.protocols);
+    const socket = this.socketTo("/ws", query);
     this.#socket = socket;
     this.#receivedAt = performance.now();
     this.settled = false;
@@ -220,6 +229,8 @@ export class Link extends EventTarget {
     if (frame === null || typeof frame !== "object") return;
     switch (frame.type) {
       case "hello":
+        if (this.#socket.answer && frame.answer !== this.#socket.answer) return this.#doubt();
+        this.#doubts = 0;
         this.#state = null;
         this.#page = number(frame.page);
         this.#secret = plain(frame.secret, 64);
@@ -305,6 +316,12 @@ export class Link extends EventTarget {
     if (this.#socket && performance.now() - this.#receivedAt > DEAD) this.#lose();
   }
 
+  /** Another program than the station answers, or the station has another token. */
+  #doubt() {
+    this.#lose();
+    if (++this.#doubts === 2) this.#emit("doubt", null);
+  }
+
   #lose() {
     const socket = this.#socket;
     this.#socket = null;
@@ -327,16 +344,3 @@ export class Link extends EventTarget {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 }
-
-/** The token of the address's fragment, which is wiped from the address, or of this tab's past. */
-function takeToken() {
-  const given = plainToken(new URLSearchParams(location.hash.slice(1)).get("token"));
-  if (given) {
-    sessionStorage.setItem(KEY, given);
-    history.replaceState(null, "", location.pathname);
-  }
-  return given || plainToken(sessionStorage.getItem(KEY));
-}
-
-/** A text if it can be a token: others cannot name a subprotocol. */
-const plainToken = (text) => (/^[\w.~-]{16,256}$/.test(text ?? "") ? text : "");

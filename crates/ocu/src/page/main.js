@@ -14,13 +14,15 @@ import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
 import { Mission } from "./mission.js";
+import { Pass } from "./pass.js";
 import { Sound } from "./sound.js";
 import { part, showControl, showHeld, showLink, showMissing, showStatus } from "./status.js";
 import { followTheme } from "./theme.js";
 import { showSystem, showTree } from "./tree.js";
 
-const account = new Account(() => link.restart(), () => link.send({ type: "active" }));
-const link = new Link(() => account.check());
+const pass = new Pass();
+const account = new Account(() => link.restart(), () => link.send({ type: "active" }), pass);
+const link = new Link(() => account.check(), pass);
 const map = new MapView((place) => choose(place), (request) => link.ask(request));
 const mission = new Mission(ask, map);
 const emergency = new Emergency(link, () => unbar());
@@ -48,6 +50,7 @@ link.addEventListener("hello", async ({ detail }) => {
   trusted = account.users ? account.operates : !detail.token_needed;
   watchable = detail.watch !== false;
   show(get("token-no"), watchable);
+  say(get("token-no"), "Only watch");
   map.offerBaseMap(detail.base_map);
   map.reconnect();
   events.reset();
@@ -76,6 +79,12 @@ link.addEventListener("close", () => {
 link.addEventListener("barred", () => {
   render();
   account.focus();
+});
+link.addEventListener("doubt", () => {
+  say(get("token-text"), STRANGER);
+  say(get("token-no"), "Forget mine");
+  show(get("token-no"), true);
+  openTokenSheet();
 });
 link.addEventListener("refused", ({ detail }) => toast("bad", detail));
 
@@ -188,6 +197,9 @@ function showFleet() {
 
 // The token.
 
+const STRANGER =
+  "The program at this address does not prove that it knows your token or login, and was told nothing. Either the station has another token now: enter it. Or another program has taken its place: see the address that the station printed.";
+
 const watching = () => sessionStorage.getItem("jaus-watch") === "yes";
 
 async function offer(token) {
@@ -218,9 +230,12 @@ get("token-form").addEventListener("submit", (event) => {
   offer(get("token").value.trim());
   get("token").value = "";
 });
-get("token-no").addEventListener("click", () => {
+get("token-no").addEventListener("click", async () => {
   sessionStorage.setItem("jaus-watch", "yes");
   show(get("token-sheet"), false);
+  if (!pass.holds) return;
+  await pass.forget();
+  link.restart();
 });
 get("control-text").addEventListener("click", () => {
   if (!trusted && link.open && !account.users) openTokenSheet();

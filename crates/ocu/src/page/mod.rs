@@ -44,6 +44,7 @@ pub(crate) const FILES: &[File] = files! {
     "/changes.js" SCRIPT "changes.js",
     "/flow.js" SCRIPT "flow.js",
     "/link.js" SCRIPT "link.js",
+    "/pass.js" SCRIPT "pass.js",
     "/stop_link.js" SCRIPT "stop_link.js",
     "/fleet.js" SCRIPT "fleet.js",
     "/handover.js" SCRIPT "handover.js",

@@ -30,7 +30,7 @@ export class StopLink extends EventTarget {
   #press = [Math.floor(Math.random() * 2 ** 32), 0];
 
   /** Stops also by requests of `link`, whose token it shows to the station. */
-  constructor(link, connect = () => new WebSocket(address(), link.protocols)) {
+  constructor(link, connect = () => link.socketTo("/stop")) {
     super();
     this.#link = link;
     link.addEventListener("stopped", ({ detail: { press, stops } }) => this.#note(String(press?.join?.(".")), stops));
@@ -176,6 +176,8 @@ class Channel {
 
   #open() {
     const socket = this.#events.connect();
+    /** What the first frame is to prove. */
+    let { answer } = socket;
     this.#socket = socket;
     this.#watch(socket, SLOWEST);
     socket.addEventListener("open", () => {
@@ -188,6 +190,12 @@ class Channel {
     });
     socket.addEventListener("message", ({ data }) => {
       if (socket !== this.#socket) return;
+      if (answer && data !== answer) {
+        // Another program than the station confirms nothing.
+        socket.close();
+        return this.#retry();
+      }
+      answer = "";
       this.#hear(socket);
       const [word, , press, stops] = String(data).split(" ", 4);
       if (word === "ok") this.#events.taken(press, Number(stops));
@@ -220,5 +228,3 @@ class Channel {
     this.#pause = Math.min(this.#pause * 2, LONGEST_PAUSE);
   }
 }
-
-const address = () => `${location.protocol === "https:" ? "wss:" : "ws:"}//${location.host}/stop`;

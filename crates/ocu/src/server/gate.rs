@@ -10,7 +10,9 @@ use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::devices::{DeviceId, Devices};
+use super::guard;
 use super::logins::{Ending, Login, LoginId, Logins};
+use super::proof::Proofs;
 use super::trail::Trail;
 use super::visitor::Visitor;
 use crate::token::Token;
@@ -33,13 +35,19 @@ pub(crate) enum Gate {
 impl Gate {
     /// The sender of a request, with the role that the request shows; `None` for one who has to
     /// log in first.
-    pub(super) fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
-        let visitor = |role| Visitor::new(OPERATOR, address, None, role);
+    pub(super) fn visitor(
+        &self,
+        headers: &HeaderMap,
+        address: SocketAddr,
+        proofs: &Proofs,
+    ) -> Option<Visitor> {
+        let from = (address, guard::host(headers).unwrap_or_default());
+        let visitor = |role| Visitor::new(OPERATOR, from, None, role);
         match self {
             Self::Open => Some(visitor(Some(UserRole::Drive))),
             Self::Token { to_read: false, .. } => Some(visitor(Some(UserRole::Observe))),
             Self::Token { to_read: true, .. } => Some(visitor(None)),
-            Self::Users(gate) => gate.visitor(headers, address),
+            Self::Users(gate) => gate.visitor(headers, from, proofs),
         }
     }
 
@@ -61,7 +69,35 @@ impl Gate {
             _ => None,
         }
     }
+
+    /// The secret that a visitor has shown or proved to know.
+    pub(super) fn secret_of(&self, visitor: &Visitor) -> Option<Token> {
+        match self {
+            Self::Open => None,
+            Self::Token { token, .. } => visitor.may(UserRole::Drive).then(|| token.clone()),
+            Self::Users(gate) => gate.logins().secret(visitor.login?),
+        }
+    }
 }
+
+/// What a request shows: a secret or a ticket.
+pub(super) fn shown(headers: &HeaderMap) -> Option<&str> {
+    let bearer = headers.get(header::AUTHORIZATION);
+    let bearer = bearer.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
+    bearer.or_else(|| token_of_handshake(headers))
+}
+
+/// The token that a page shows as it opens a WebSocket.
+fn token_of_handshake(headers: &HeaderMap) -> Option<&str> {
+    let named = headers.get_all(header::SEC_WEBSOCKET_PROTOCOL).iter();
+    let mut named = named
+        .filter_map(|it| it.to_str().ok())
+        .flat_map(|it| it.split(','));
+    named.find_map(|it| it.trim().strip_prefix(TOKEN_SUBPROTOCOL))
+}
+
+/// A browser sets no other header of a WebSocket, so a page names its token there.
+const TOKEN_SUBPROTOCOL: &str = "token.";
 
 /// Why nobody is logged in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -83,8 +119,9 @@ pub(crate) struct UserGate {
     file: UsersFile,
     logins: Mutex<Logins>,
     trail: Trail,
-    /// Name of the cookie with a session's secret. Browsers do not tell the ports of a host apart.
-    cookie: String,
+    /// Name of the cookie with a device's secret, which only spares it delays: browsers show cookies to every port
+    /// of a host.
+    device_cookie: String,
     /// Whether the page is served over TLS.
     is_secure: bool,
     /// From where users have logged in before.
@@ -124,16 +161,13 @@ impl UserGate {
         is_secure: bool,
         trail: Trail,
     ) -> Self {
-        let cookie = if is_secure {
-            format!("__Host-jaus-{port}")
-        } else {
-            format!("jaus-{port}")
-        };
+        let prefix = if is_secure { "__Host-" } else { "" };
+        let device_cookie = format!("{prefix}jaus-{port}-device");
         Self {
             file,
             logins: Mutex::default(),
             trail,
-            cookie,
+            device_cookie,
             is_secure,
             devices,
             lanes: [LoginQueue::new(), LoginQueue::new()],
@@ -149,22 +183,22 @@ impl UserGate {
         self.logins.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
-        let secret = cookie(headers, &self.cookie)?;
+    fn visitor(
+        &self,
+        headers: &HeaderMap,
+        from: (SocketAddr, &str),
+        proofs: &Proofs,
+    ) -> Option<Visitor> {
+        let shown = shown(headers)?;
         let logins = self.logins();
-        let login = logins.find(secret)?;
+        let login = logins.find(|secret| proofs.is_shown(secret, from.1, shown))?;
         let name = &login.user.name;
-        Some(Visitor::new(
-            name,
-            address,
-            Some(login.id),
-            Some(login.role()),
-        ))
+        Some(Visitor::new(name, from, Some(login.id), Some(login.role())))
     }
 
     /// The device of a request, if the user has logged in from it before.
     pub(super) fn device(&self, headers: &HeaderMap, user: &str) -> Option<DeviceId> {
-        let secret = cookie(headers, &self.device_cookie())?;
+        let secret = cookie(headers, &self.device_cookie)?;
         self.devices.find(user, secret)
     }
 
@@ -176,7 +210,7 @@ impl UserGate {
         user: &str,
     ) -> Result<String, LoginError> {
         let users = self.users();
-        let shown = cookie(headers, &self.device_cookie());
+        let shown = cookie(headers, &self.device_cookie);
         let known = shown.filter(|secret| self.devices.is_known(&users, secret));
         let secret = match known.and_then(Token::new) {
             Some(secret) => secret,
@@ -184,13 +218,10 @@ impl UserGate {
         };
         self.devices.remember(&users, user, &secret);
         let age = Self::DEVICE_AGE.as_secs();
-        let cookie = self.cookie_with(&self.device_cookie(), secret.reveal());
-        Ok(format!("{cookie}; Max-Age={age}"))
-    }
-
-    /// Name of the cookie with a device's secret.
-    fn device_cookie(&self) -> String {
-        format!("{}-device", self.cookie)
+        let (name, value) = (&self.device_cookie, secret.reveal());
+        let secure = if self.is_secure { "; Secure" } else { "" };
+        let attributes = format!("Path=/; HttpOnly; SameSite=Strict{secure}; Max-Age={age}");
+        Ok(format!("{name}={value}; {attributes}"))
     }
 
     /// Checks that users can log in: a file that has become unusable may lack one who was removed.
@@ -239,23 +270,6 @@ impl UserGate {
             self.trail.ended(&login, &Ending::Displaced);
         }
         Ok(secret)
-    }
-
-    /// The header `Set-Cookie` for a secret.
-    pub(super) fn set_cookie(&self, secret: &Token) -> String {
-        let age = Logins::LONGEST.as_secs();
-        let cookie = self.cookie_with(&self.cookie, secret.reveal());
-        format!("{cookie}; Max-Age={age}")
-    }
-
-    /// The header `Set-Cookie` that removes the cookie.
-    pub(super) fn clear_cookie(&self) -> String {
-        format!("{}; Max-Age=0", self.cookie_with(&self.cookie, ""))
-    }
-
-    fn cookie_with(&self, name: &str, value: &str) -> String {
-        let secure = if self.is_secure { "; Secure" } else { "" };
-        format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict{secure}")
     }
 
     /// Ends a session.

@@ -31,8 +31,8 @@ impl Refusal {
 
 /// Accepts requests from the own page, from a typed URL, and from programs other than browsers.
 pub(super) fn check(headers: &HeaderMap, hosts: &[String]) -> Result<(), Refusal> {
-    let host = sole(headers, &header::HOST).ok_or(Refusal::NoHost)?;
-    let name = name_of(host);
+    let host = host(headers).ok_or(Refusal::NoHost)?;
+    let (name, _) = name_and_port(host);
     if !is_ours(name, hosts) {
         return Err(Refusal::UnknownHost(name.chars().take(80).collect()));
     }
@@ -54,6 +54,11 @@ pub(super) fn check(headers: &HeaderMap, hosts: &[String]) -> Result<(), Refusal
     }
 }
 
+/// The host of a request.
+pub(super) fn host(headers: &HeaderMap) -> Option<&str> {
+    sole(headers, &header::HOST)
+}
+
 /// The value of a header that occurs exactly once.
 fn sole(headers: &HeaderMap, name: impl header::AsHeaderName) -> Option<&str> {
     let mut values = headers.get_all(name).iter();
@@ -61,11 +66,13 @@ fn sole(headers: &HeaderMap, name: impl header::AsHeaderName) -> Option<&str> {
     values.next().is_none().then_some(value)?.to_str().ok()
 }
 
-/// The host without its port.
-fn name_of(host: &str) -> &str {
+/// The name of a host, and the port that it names.
+pub(super) fn name_and_port(host: &str) -> (&str, Option<u16>) {
     match host.rsplit_once(':') {
-        Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => name,
-        _ => host,
+        Some((name, port)) if port.bytes().all(|it| it.is_ascii_digit()) => {
+            (name, port.parse().ok())
+        }
+        _ => (host, None),
     }
 }
 
@@ -75,9 +82,12 @@ fn is_ours(name: &str, hosts: &[String]) -> bool {
     let inner = name.strip_prefix('[').and_then(|it| it.strip_suffix(']'));
     let is_address = name.parse::<IpAddr>().is_ok_and(|it| it.is_ipv4())
         || inner.is_some_and(|it| it.parse::<Ipv6Addr>().is_ok());
-    is_address
-        || name.eq_ignore_ascii_case("localhost")
-        || hosts.iter().any(|host| name.eq_ignore_ascii_case(host))
+    is_address || name.eq_ignore_ascii_case("localhost") || is_given(name, hosts)
+}
+
+/// Whether the name was given.
+pub(super) fn is_given(name: &str, hosts: &[String]) -> bool {
+    hosts.iter().any(|host| name.eq_ignore_ascii_case(host))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use axum::Json;
 use axum::body::{Body, to_bytes};
 use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::{AppendHeaders, IntoResponse, Response};
+use axum::response::{IntoResponse, Response};
 use jaus_limits::Source;
 use serde::{Deserialize, Serialize};
 use tokio::time::{sleep, timeout};
@@ -33,11 +33,20 @@ struct Credentials {
     password: String,
 }
 
+/// The session that a login has begun.
+#[derive(Serialize)]
+struct Begun {
+    /// What the page is to show, or to make its tickets of.
+    secret: String,
+}
+
 /// Who is logged in.
 #[derive(Serialize)]
 struct Session {
     /// Whether the page has users, who must log in.
     users: bool,
+    /// The run of the station, for which a page makes its ticket.
+    run: String,
     user: Option<String>,
     role: Option<UserRole>,
 }
@@ -72,9 +81,10 @@ pub(super) async fn session(
     headers: HeaderMap,
 ) -> Response {
     let users = shared.admission.gate.users();
-    let visitor = users.and_then(|_| shared.admission.gate.visitor(&headers, address));
+    let visitor = users.and_then(|_| shared.visitor(&headers, address));
     let session = Session {
         users: users.is_some(),
+        run: shared.admission.proofs.run().to_owned(),
         user: visitor.as_ref().map(|it| it.user.to_string()),
         role: visitor.as_ref().and_then(Visitor::role),
     };
@@ -114,14 +124,18 @@ pub(super) async fn log_in(
     let login = gate.log_in(&name, password, address, is_known_device);
     let logged_in = login.await.and_then(|secret| {
         let device = gate.remember_device(&headers, &name)?;
-        Ok([gate.set_cookie(&secret), device])
+        Ok((secret, device))
     });
     match logged_in {
-        Ok(cookies) => {
+        Ok((secret, device)) => {
             shared.attempts().succeeded(&guesser, &name);
             shared.admission.trail.login(&name, address, None);
-            let cookies = cookies.map(|it| (header::SET_COOKIE, it));
-            (StatusCode::NO_CONTENT, AppendHeaders(cookies)).into_response()
+            let headers = [
+                (header::SET_COOKIE, device),
+                (header::CACHE_CONTROL, "no-store".to_owned()),
+            ];
+            let secret = secret.reveal().to_owned();
+            (headers, Json(Begun { secret })).into_response()
         }
         Err(error) => shared.refuse_login(&name, address, error),
     }
@@ -163,12 +177,11 @@ pub(super) async fn log_out(
     let Some(gate) = shared.admission.gate.users() else {
         return NO_USERS.into_response();
     };
-    let visitor = shared.admission.gate.visitor(&headers, address);
+    let visitor = shared.visitor(&headers, address);
     if let Some(id) = visitor.and_then(|it| it.login) {
         gate.end(id, &Ending::LoggedOut);
     }
-    let cookie = [(header::SET_COOKIE, gate.clear_cookie())];
-    (StatusCode::NO_CONTENT, cookie).into_response()
+    StatusCode::NO_CONTENT.into_response()
 }
 
 /// All sessions, for those who administer them.
@@ -221,7 +234,7 @@ fn administrator<'s>(
     address: SocketAddr,
 ) -> Result<(&'s UserGate, Visitor), Refusal> {
     let gate = shared.admission.gate.users().ok_or(NO_USERS)?;
-    match shared.admission.gate.visitor(headers, address) {
+    match shared.visitor(headers, address) {
         Some(visitor) if visitor.may(UserRole::Administer) => {
             // The session is in use.
             gate.holds(&visitor, true);

@@ -1,6 +1,6 @@
 //! Who is logged in: the sessions of users, each with a secret, an idle limit and an age limit.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -16,6 +16,8 @@ pub(super) type LoginId = u64;
 #[derive(Debug)]
 pub(super) struct Login {
     pub(super) id: LoginId,
+    /// What the user's pages prove to know.
+    pub(super) secret: Token,
     /// The user at login, with the role that the session has.
     pub(super) user: Arc<User>,
     pub(super) address: SocketAddr,
@@ -55,10 +57,10 @@ impl fmt::Display for Ending {
     }
 }
 
-/// The sessions of all users, by their secrets.
+/// The sessions of all users.
 #[derive(Debug, Default)]
 pub(super) struct Logins {
-    by_secret: HashMap<String, Login>,
+    by_id: BTreeMap<LoginId, Login>,
     last_id: LoginId,
 }
 
@@ -78,72 +80,66 @@ impl Logins {
         user: Arc<User>,
         address: SocketAddr,
     ) -> Option<Login> {
-        let mine = || {
-            self.by_secret
-                .iter()
-                .filter(|(_, it)| it.user.name == user.name)
-        };
+        let mine = || self.by_id.values().filter(|it| it.user.name == user.name);
         let mut displaced = None;
         if mine().count() >= Self::MOST_OF_USER {
-            let idlest = mine().min_by_key(|(_, it)| it.active);
-            let secret = idlest.map(|(secret, _)| secret.clone());
-            displaced = secret.and_then(|it| self.by_secret.remove(&it));
+            let idlest = mine().min_by_key(|it| it.active).map(|it| it.id);
+            displaced = idlest.and_then(|id| self.end(id));
         }
         self.last_id += 1;
         let login = Login {
             id: self.last_id,
+            secret: secret.clone(),
             user,
             address,
             since: now,
             active: now,
         };
-        self.by_secret.insert(secret.reveal().to_owned(), login);
+        self.by_id.insert(login.id, login);
         displaced
     }
 
-    /// The session with this secret.
-    pub(super) fn find(&self, secret: &str) -> Option<&Login> {
-        self.by_secret.get(secret)
+    /// The session with a secret.
+    pub(super) fn find(&self, is_it: impl Fn(&Token) -> bool) -> Option<&Login> {
+        self.by_id.values().find(|it| is_it(&it.secret))
+    }
+
+    /// The secret of a session.
+    pub(super) fn secret(&self, id: LoginId) -> Option<Token> {
+        Some(self.by_id.get(&id)?.secret.clone())
     }
 
     /// Whether a session has not ended.
     pub(super) fn contains(&self, id: LoginId) -> bool {
-        self.by_secret.values().any(|it| it.id == id)
+        self.by_id.contains_key(&id)
     }
 
     /// The user of a session has done something.
     pub(super) fn touch(&mut self, now: Instant, id: LoginId) {
-        let login = self.by_secret.values_mut().find(|it| it.id == id);
-        if let Some(login) = login {
+        if let Some(login) = self.by_id.get_mut(&id) {
             login.active = login.active.max(now);
         }
     }
 
     /// Ends a session.
     pub(super) fn end(&mut self, id: LoginId) -> Option<Login> {
-        let found = self.by_secret.iter().find(|(_, it)| it.id == id);
-        let secret = found?.0.clone();
-        self.by_secret.remove(&secret)
+        self.by_id.remove(&id)
     }
 
     /// Ends the sessions whose time is over, or to which the users file does not entitle any more.
     pub(super) fn expire(&mut self, now: Instant, users: &Users) -> Vec<(Login, Ending)> {
-        let ended = self
-            .by_secret
-            .extract_if(|_, it| it.ending(now, users).is_some());
+        let ended = self.by_id.values();
+        let ended = ended.filter_map(|it| Some((it.id, it.ending(now, users)?)));
+        let ended: Vec<_> = ended.collect();
+        let ended = ended.into_iter();
         ended
-            .filter_map(|(_, login)| {
-                let ending = login.ending(now, users)?;
-                Some((login, ending))
-            })
+            .filter_map(|(id, why)| Some((self.end(id)?, why)))
             .collect()
     }
 
     /// All sessions, the newest last.
     pub(super) fn all(&self) -> Vec<&Login> {
-        let mut all: Vec<_> = self.by_secret.values().collect();
-        all.sort_by_key(|it| it.id);
-        all
+        self.by_id.values().collect()
     }
 }
 
@@ -203,9 +199,10 @@ mod tests {
     fn a_session_is_found_by_its_secret_alone() {
         let (now, secret) = (Instant::now(), Token::generate().unwrap());
         let logins = logins(now, &secret);
-        assert_eq!(logins.find(secret.reveal()).unwrap().user.name, "anna");
+        let find = |secret: &str| logins.find(|it| it.is(secret));
+        assert_eq!(find(secret.reveal()).unwrap().user.name, "anna");
         for wrong in ["", "anna", &secret.reveal()[1..]] {
-            assert!(logins.find(wrong).is_none(), "{wrong}");
+            assert!(find(wrong).is_none(), "{wrong}");
         }
     }
 
@@ -218,7 +215,7 @@ mod tests {
         ends(&mut idle, start + 30 * MINUTE, &users, Ending::Idle);
 
         let mut busy = logins(start, &secret);
-        let id = busy.find(secret.reveal()).unwrap().id;
+        let id = busy.all()[0].id;
         for minute in 0..12 * 60 {
             let now = start + MINUTE * minute;
             assert!(busy.expire(now, &users).is_empty(), "minute {minute}");
@@ -251,7 +248,7 @@ mod tests {
         let raised = users(&[("anna", UserRole::Administer)]);
         let mut logins = logins(now, &secret);
         assert!(logins.expire(now, &raised).is_empty());
-        let role = logins.find(secret.reveal()).unwrap().role();
+        let role = logins.all()[0].role();
         assert_eq!(role, UserRole::Drive, "until the next login");
     }
 
@@ -268,6 +265,6 @@ mod tests {
             assert_eq!(displaced.is_some(), minute >= 4, "minute {minute}");
         }
         assert_eq!(logins.all().len(), 4);
-        assert!(logins.find(first.reveal()).is_none());
+        assert!(logins.find(|it| *it == first).is_none());
     }
 }

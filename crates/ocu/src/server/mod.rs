@@ -8,9 +8,11 @@ mod connections;
 mod devices;
 mod gate;
 mod guard;
+mod introduction;
 mod login;
 mod logins;
 mod looks;
+mod proof;
 mod socket;
 mod stop_socket;
 mod trail;
@@ -39,13 +41,15 @@ use self::attempts::Attempts;
 pub(super) use self::connections::MemoryBrowsers;
 pub(super) use self::devices::Devices;
 pub(super) use self::gate::{Gate, UserGate};
-use self::socket::Introduction;
+use self::introduction::Introduction;
+pub(super) use self::proof::Proofs;
 pub(super) use self::trail::Trail;
 use self::visitor::Visitor;
 use super::base_map::BaseMap;
 use super::orders::{Access, Order};
 use super::page::{self, File};
 use super::tls::Tls;
+use super::token::Token;
 use super::users::{UserRole, UsersFile};
 use jaus::address::JausId;
 use jaus::node::{Node, now};
@@ -56,6 +60,7 @@ pub(super) struct Admission {
     pub(super) operator: JausId,
     pub(super) authority: u8,
     pub(super) gate: Gate,
+    pub(super) proofs: Proofs,
     pub(super) trail: Trail,
     pub(super) hosts: Vec<String>,
     /// The geographic map behind the vehicle.
@@ -293,15 +298,18 @@ async fn serve_map(
 async fn serve_page(
     State(shared): State<Arc<Shared>>,
     ConnectInfo(address): ConnectInfo<SocketAddr>,
-    Query(introduction): Query<Introduction>,
+    Query(mut introduction): Query<Introduction>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let places = [&shared.places, &shared.strangers];
     match shared.admit_socket(address, &headers, places).await {
-        Ok(visitor) => of_page(upgrade, &[SUBPROTOCOL]).on_upgrade(async move |socket| {
-            socket::serve(socket, shared, visitor, introduction).await;
-        }),
+        Ok(visitor) => {
+            introduction.answer(&shared, &visitor);
+            of_page(upgrade, &[SUBPROTOCOL]).on_upgrade(async move |socket| {
+                socket::serve(socket, shared, visitor, introduction).await;
+            })
+        }
         Err(refusal) => refusal.into_response(),
     }
 }
@@ -309,6 +317,7 @@ async fn serve_page(
 async fn serve_stops(
     State(shared): State<Arc<Shared>>,
     ConnectInfo(address): ConnectInfo<SocketAddr>,
+    Query(mut introduction): Query<Introduction>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
@@ -316,8 +325,9 @@ async fn serve_stops(
     match shared.admit_socket(address, &headers, places).await {
         Ok(visitor) => {
             let upgrade = of_page(upgrade, &[SUBPROTOCOL, OLDER_SUBPROTOCOL]);
+            introduction.answer(&shared, &visitor);
             upgrade.on_upgrade(async move |socket| {
-                stop_socket::serve(socket, shared, visitor).await;
+                stop_socket::serve(socket, shared, visitor, introduction).await;
             })
         }
         Err(refusal) => refusal.into_response(),
@@ -333,32 +343,29 @@ fn of_page(upgrade: WebSocketUpgrade, subprotocols: &'static [&str]) -> WebSocke
 }
 
 /// The subprotocol of a page's WebSocket. A browser sets no other header of a WebSocket, so a page
-/// names the token there as well. A page that was loaded from an older station knows no
+/// names the token, or its ticket, there as well. A page that was loaded from an older station knows no
 /// [changes](crate::changes) of states and must not show them: its browser gives a WebSocket up for which the
 /// station does not choose one of its subprotocols. It can still stop vehicles.
 const SUBPROTOCOL: &str = "jaus.4";
 const OLDER_SUBPROTOCOL: &str = "jaus";
-const TOKEN_SUBPROTOCOL: &str = "token.";
-
-/// The token that a page shows as it opens a WebSocket.
-fn token_of_handshake(headers: &HeaderMap) -> Option<&str> {
-    let named = headers.get_all(header::SEC_WEBSOCKET_PROTOCOL).iter();
-    let mut named = named
-        .filter_map(|it| it.to_str().ok())
-        .flat_map(|it| it.split(','));
-    named.find_map(|it| it.trim().strip_prefix(TOKEN_SUBPROTOCOL))
-}
 
 impl Shared {
     fn attempts(&self) -> MutexGuard<'_, Attempts> {
         self.attempts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the shown token is right. Wrong ones are counted, and answered late: with at least 16
+    /// The sender of a request; `None` for one who has to log in first.
+    fn visitor(&self, headers: &HeaderMap, address: SocketAddr) -> Option<Visitor> {
+        let Admission { gate, proofs, .. } = &self.admission;
+        gate.visitor(headers, address, proofs)
+    }
+
+    /// Whether the shown token is right, or the ticket of one who has it. Wrong ones are counted, and answered late: with at least 16
     /// characters and the limits of connections, that is enough, and no guess makes others wait.
-    async fn admits(&self, shown: &str) -> bool {
-        let token = self.admission.gate.token();
-        if token.is_none_or(|it| it.is(shown)) {
+    async fn admits(&self, visitor: &Visitor, shown: &str) -> bool {
+        let Admission { gate, proofs, .. } = &self.admission;
+        let is_right = |token: &Token| proofs.is_shown(token, &visitor.host, shown);
+        if gate.token().is_none_or(is_right) {
             return true;
         }
         self.counters.wrong_tokens.fetch_add(1, Relaxed);
@@ -376,9 +383,8 @@ impl Shared {
         headers: &HeaderMap,
         places: [&Places; 2],
     ) -> Result<Visitor, (StatusCode, String)> {
-        let gate = &self.admission.gate;
         let stranger = || (StatusCode::UNAUTHORIZED, "log in first\n".to_owned());
-        let visitor = gate.visitor(headers, address).ok_or_else(stranger)?;
+        let visitor = self.visitor(headers, address).ok_or_else(stranger)?;
         match self.seat(&visitor, headers, places).await {
             Ok(()) => Ok(visitor),
             Err(why) => Err((StatusCode::SERVICE_UNAVAILABLE, why + "\n")),
@@ -400,8 +406,8 @@ impl Shared {
             visitor.settle(Some(self.place(places, visitor)?));
             return Ok(());
         }
-        match token_of_handshake(headers) {
-            Some(shown) if self.admits(shown).await => self.trust(visitor, places),
+        match gate::shown(headers) {
+            Some(shown) if self.admits(visitor, shown).await => self.trust(visitor, places),
             // Hello says that the token is needed, so that the page asks the user for another.
             _ => {
                 visitor.settle(Some(self.place(strangers, visitor)?));
@@ -420,7 +426,7 @@ impl Shared {
         shown: &str,
         places: &Places,
     ) -> Result<(), String> {
-        if !self.admits(shown).await {
+        if !self.admits(visitor, shown).await {
             return Err("wrong token".to_owned());
         }
         if self.admission.gate.token().is_none() || visitor.may(UserRole::Drive) {
@@ -463,16 +469,14 @@ impl Shared {
 
     /// Checks that a request may read vehicle data.
     async fn check_reader(&self, headers: &HeaderMap, address: SocketAddr) -> Result<(), Refusal> {
-        let Some(visitor) = self.admission.gate.visitor(headers, address) else {
+        let Some(visitor) = self.visitor(headers, address) else {
             return Err((StatusCode::UNAUTHORIZED, "log in first\n"));
         };
         if visitor.may(UserRole::Observe) {
             return Ok(());
         }
-        let shown = headers.get(header::AUTHORIZATION);
-        let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
-        match shown {
-            Some(shown) if self.admits(shown).await => Ok(()),
+        match gate::shown(headers) {
+            Some(shown) if self.admits(&visitor, shown).await => Ok(()),
             _ => {
                 let words = "this requires the token: send Authorization: Bearer TOKEN\n";
                 Err((StatusCode::UNAUTHORIZED, words))

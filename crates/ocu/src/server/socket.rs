@@ -9,13 +9,13 @@ use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use jaus_limits::Bucket;
-use serde::Deserialize;
 use serde_json::{Map, Value};
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::{MissedTickBehavior, interval, interval_at, sleep, timeout};
 
 use super::Shared;
 use super::bounds::FRAMES;
+use super::introduction::Introduction;
 use super::view::{self, MessageView};
 use super::visitor::Visitor;
 use crate::answer::Said as Answer;
@@ -53,16 +53,6 @@ const SESSION_ENDED: u16 = 4001;
 const REFUSAL: Duration = Duration::from_secs(1);
 /// Interval of the frames about the links.
 const LINK: Duration = Duration::from_secs(1);
-
-/// What a page says when it connects.
-#[derive(Debug, Default, Deserialize)]
-pub(super) struct Introduction {
-    /// The vehicle to show.
-    vehicle: Option<u16>,
-    /// The number of the same page's previous connection, and the secret that came with it.
-    replaces: Option<u64>,
-    secret: Option<String>,
-}
 
 /// The link to the page. The reader notes confirmations, and the writer the states that it sends.
 #[derive(Default)]
@@ -125,6 +115,7 @@ pub(super) async fn serve(
     let writer = Writer {
         page,
         secret,
+        answer: introduction.answer,
         shared: &shared,
         visitor: &visitor,
         link: &link,
@@ -489,6 +480,8 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
 struct Writer<'s> {
     page: PageId,
     secret: Option<Token>,
+    /// By it the page knows this station.
+    answer: Option<Token>,
     shared: &'s Shared,
     visitor: &'s Visitor,
     link: &'s SharedLink,
@@ -590,6 +583,7 @@ impl Writer<'_> {
             version: VERSION,
             page: self.page.0,
             secret: self.secret.as_ref().map(Token::reveal),
+            answer: self.answer.as_ref().map(Token::reveal),
             // Most pages have shown it with their first request.
             token_needed: admission.gate.token().is_some() && !self.visitor.may(UserRole::Drive),
             watch: admission.gate.lets_watch(),

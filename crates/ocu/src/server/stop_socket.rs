@@ -6,8 +6,8 @@
 //! stops. The answer is `ok SUBSYSTEM PRESS COUNT` or `ok all PRESS COUNT` when the emergency has been
 //! sent, `cleared SUBSYSTEM PRESS` if this press was cleared since, or `no REASON`. The count is that of
 //! all stops that the station has taken with this one: a state that names a lower one was made before.
-//! Where reading requires the token, `token TOKEN` comes first. The station sends an empty frame every
-//! 10 s.
+//! Where reading requires the token, `token TOKEN` comes first. The first frame of the station is the answer to the
+//! page's nonce if it named one, and else empty; then comes an empty one every 10 s.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -21,6 +21,7 @@ use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
 
 use super::Shared;
 use super::bounds::FRAMES;
+use super::introduction::Introduction;
 use super::socket::{Parting, supervise};
 use super::visitor::Visitor;
 use crate::orders::{StopOrder, StopReply, StopTarget, TakenStop};
@@ -41,9 +42,16 @@ const LARGEST: usize = 32;
 const ANSWERS: usize = 8;
 
 /// Serves a connection until either side closes it.
-pub(super) async fn serve(mut socket: WebSocket, shared: Arc<Shared>, visitor: Visitor) {
+pub(super) async fn serve(
+    mut socket: WebSocket,
+    shared: Arc<Shared>,
+    visitor: Visitor,
+    introduction: Introduction,
+) {
+    let answer = introduction.answer.as_ref();
+    let first = answer.map_or_else(Utf8Bytes::default, |it| it.reveal().into());
     let parting = tokio::select! {
-        parting = Stops::new(&shared, &visitor).run(&mut socket) => parting,
+        parting = Stops::new(&shared, &visitor).run(&mut socket, first) => parting,
         parting = supervise(&shared, &visitor) => Some(parting),
     };
     if let Some((code, reason)) = parting {
@@ -74,9 +82,9 @@ impl<'s> Stops<'s> {
         }
     }
 
-    async fn run(mut self, socket: &mut WebSocket) -> Option<Parting> {
+    async fn run(mut self, socket: &mut WebSocket, first: Utf8Bytes) -> Option<Parting> {
         let mut pulses = self.pulses();
-        let mut next = Some(Message::Text(Utf8Bytes::from_static("")));
+        let mut next = Some(Message::Text(first));
         loop {
             if let Some(message) = next.take() {
                 timeout(STUCK, socket.send(message)).await.ok()?.ok()?;

@@ -16,6 +16,8 @@ use crate::users::{PageRights, UserRole};
 pub(super) struct Visitor {
     pub(super) user: Arc<str>,
     pub(super) address: SocketAddr,
+    /// The host and port that the request names.
+    pub(super) host: String,
     /// The session of a user.
     pub(super) login: Option<LoginId>,
     /// `None` without permission to see anything. The right token raises it.
@@ -28,13 +30,14 @@ pub(super) struct Visitor {
 impl Visitor {
     pub(super) fn new(
         user: &str,
-        address: SocketAddr,
+        (address, host): (SocketAddr, &str),
         login: Option<LoginId>,
         role: Option<UserRole>,
     ) -> Self {
         Self {
             user: Arc::from(user),
             address,
+            host: host.to_owned(),
             login,
             role: Mutex::new(role),
             place: Mutex::new(None),

@@ -29,7 +29,7 @@ async fn guarded(token_to_read: bool) -> Scene {
 }
 
 /// Sends a plain HTTP request. Returns the complete response.
-async fn get(scene: &Scene, path: &str, header: &str) -> String {
+pub(crate) async fn get(scene: &Scene, path: &str, header: &str) -> String {
     let mut stream = TcpStream::connect(scene.address).await.unwrap();
     let request = format!("GET {path} HTTP/1.1\r\n{header}Connection: close\r\n\r\n");
     stream.write_all(request.as_bytes()).await.unwrap();

@@ -19,6 +19,7 @@ mod hostile;
 mod looking;
 mod missing;
 mod page;
+mod proof;
 mod stop;
 mod truth;
 mod users;

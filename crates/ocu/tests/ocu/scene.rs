@@ -372,7 +372,10 @@ impl Page {
         Self::open_at(&url, &[]).await.unwrap()
     }
 
-    async fn open_at(url: &str, headers: &[(&'static str, &str)]) -> Result<Self, Box<Error>> {
+    pub(crate) async fn open_at(
+        url: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, Box<Error>> {
         let mut request = url.into_client_request().unwrap();
         for (name, value) in headers {
             request.headers_mut().insert(*name, value.parse().unwrap());

@@ -74,10 +74,10 @@ impl Guarded {
     }
 
     /// Sends a POST request. Returns the head of the response and its body.
-    async fn post(&self, path: &str, cookie: &str, body: &str) -> (String, String) {
+    async fn post(&self, path: &str, (name, value): (&str, &str), body: &str) -> (String, String) {
         let mut stream = TcpStream::connect(self.scene.address).await.unwrap();
         let request = format!(
-            "POST {path} HTTP/1.1\r\nHost: localhost\r\nCookie: {cookie}\r\nContent-Length: {}\r\n\
+            "POST {path} HTTP/1.1\r\nHost: localhost\r\n{name}: {value}\r\nContent-Length: {}\r\n\
              Connection: close\r\n\r\n{body}",
             body.len()
         );
@@ -97,7 +97,7 @@ impl Guarded {
     /// From a browser with this cookie.
     async fn try_login_from(&self, cookie: &str, name: &str, password: &str) -> (String, String) {
         let body = json!({"name": name, "password": password}).to_string();
-        self.post("/login", cookie, &body).await
+        self.post("/login", ("Cookie", cookie), &body).await
     }
 
     /// Guesses a password until this address is refused.
@@ -112,39 +112,30 @@ impl Guarded {
         panic!("it may guess on and on");
     }
 
-    /// Logs in. Returns the cookie.
+    /// Logs in. Returns what shows the session: no cookie, which a browser would send to other ports of the host, too.
     async fn login(&self, name: &str) -> String {
-        let (head, _) = self.try_login(name, PASSWORD).await;
-        assert!(head.starts_with("HTTP/1.1 204"), "{head}");
-        let mut lines = head.lines();
-        let cookie = lines
-            .find_map(|it| it.strip_prefix("set-cookie: "))
-            .unwrap();
-        for attribute in [
-            "; HttpOnly",
-            "; SameSite=Strict",
-            "; Path=/",
-            "; Max-Age=43200",
-        ] {
-            assert!(cookie.contains(attribute), "{cookie}");
-        }
-        cookie.split(';').next().unwrap().to_owned()
+        let (head, body) = self.try_login(name, PASSWORD).await;
+        assert!(head.starts_with("HTTP/1.1 200"), "{head}");
+        let body: Value = serde_json::from_str(&body).unwrap();
+        let secret = body["secret"].as_str().unwrap();
+        assert!(!head.contains(secret), "{head}");
+        format!("Bearer {secret}")
     }
 
-    async fn get(&self, path: &str, cookie: &str) -> (String, Value) {
-        let headers = format!("Cookie: {cookie}\r\n");
+    async fn get(&self, path: &str, shown: &str) -> (String, Value) {
+        let headers = format!("Authorization: {shown}\r\n");
         let (head, body) = self.scene.get(path, &headers).await;
         (head, serde_json::from_slice(&body).unwrap_or_default())
     }
 
-    async fn page(&self, cookie: &str) -> Page {
-        let page = Page::try_open(self.scene.address, &[("cookie", cookie)]).await;
+    async fn page(&self, shown: &str) -> Page {
+        let page = Page::try_open(self.scene.address, &[("authorization", shown)]).await;
         page.unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// Status of an attempt to open a page.
-    async fn page_status(&self, cookie: &str) -> u16 {
-        match Page::try_open(self.scene.address, &[("cookie", cookie)]).await {
+    async fn page_status(&self, shown: &str) -> u16 {
+        match Page::try_open(self.scene.address, &[("authorization", shown)]).await {
             Ok(_) => 101,
             Err(error) => match *error {
                 Error::Http(answer) => answer.status().as_u16(),
@@ -170,12 +161,14 @@ async fn session_ends(page: &mut Page) {
 #[tokio::test]
 async fn without_a_login_nothing_is_shown_but_the_form() {
     let guarded = Guarded::new().await;
-    for cookie in ["", "jaus=x", "jaus-1=0123456789abcdef0123456789abcdef"] {
-        assert_eq!(guarded.page_status(cookie).await, 401);
-        let (head, _) = guarded.get("/map/101/1", cookie).await;
+    for shown in ["", "Bearer x", "Bearer 0123456789abcdef0123456789abcdef"] {
+        assert_eq!(guarded.page_status(shown).await, 401);
+        let (head, _) = guarded.get("/map/101/1", shown).await;
         assert!(head.starts_with("http/1.1 401"), "{head}");
-        let (_, session) = guarded.get("/session", cookie).await;
-        assert_eq!(session, json!({"users": true, "user": null, "role": null}));
+        let (_, mut session) = guarded.get("/session", shown).await;
+        assert_eq!(session["run"].take().as_str().unwrap().len(), 32);
+        let nobody = json!({"users": true, "run": null, "user": null, "role": null});
+        assert_eq!(session, nobody);
     }
     let (head, _) = guarded.get("/", "").await;
     assert!(head.starts_with("http/1.1 200"), "{head}");
@@ -212,7 +205,7 @@ async fn a_browser_from_which_a_user_has_logged_in_is_not_locked_out_by_guesses_
     let device = cookie.split(';').next().unwrap();
     guarded.guess_until_refused("anna").await;
     let (head, _) = guarded.try_login_from(device, "anna", PASSWORD).await;
-    assert!(head.starts_with("HTTP/1.1 204"), "{head}");
+    assert!(head.starts_with("HTTP/1.1 200"), "{head}");
     let again = head.lines().any(|it| it.contains(device));
     assert!(again, "it keeps its secret: {head}");
     let (head, _) = guarded.try_login_from(device, "ben", PASSWORD).await;
@@ -247,14 +240,14 @@ async fn guesses_from_three_addresses_keep_the_right_password_from_a_fresh_one_o
         log_in(2 + guess % 3, "wrong").await;
     }
     let answer = log_in(9, PASSWORD).await;
-    assert!(answer.starts_with("HTTP/1.1 204"), "{answer}");
+    assert!(answer.starts_with("HTTP/1.1 200"), "{answer}");
 }
 
 #[tokio::test]
 async fn one_who_observes_sees_the_vehicle_and_stops_it_and_does_nothing_else() {
     let guarded = Guarded::new().await;
-    let cookie = guarded.login("carl").await;
-    let mut page = guarded.page(&cookie).await;
+    let shown = guarded.login("carl").await;
+    let mut page = guarded.page(&shown).await;
     page.until(|state| driver_of(state)["state"] == "standby")
         .await;
     for request in [
@@ -273,7 +266,7 @@ async fn one_who_observes_sees_the_vehicle_and_stops_it_and_does_nothing_else() 
         .unwrap();
     page.until(|state| state["vehicle"]["emergency"] == true)
         .await;
-    let (head, _) = guarded.get("/sessions", &cookie).await;
+    let (head, _) = guarded.get("/sessions", &shown).await;
     assert!(head.starts_with("http/1.1 403"), "{head}");
     until(|| guarded.has_recorded(&["carl", "control requested", "refused", "role drive"])).await;
 }
@@ -338,9 +331,9 @@ async fn an_administrator_sees_who_is_logged_in_and_ends_a_session() {
     assert_eq!(users, ["ben", "anna"]);
     assert_eq!(sessions[1]["own"], true);
     let end = format!("/sessions/{}/end", sessions[0]["id"]);
-    let (head, _) = guarded.post(&end, &ben, "").await;
+    let (head, _) = guarded.post(&end, ("Authorization", &ben), "").await;
     assert!(head.starts_with("HTTP/1.1 403"), "{head}");
-    let (head, _) = guarded.post(&end, &anna, "").await;
+    let (head, _) = guarded.post(&end, ("Authorization", &anna), "").await;
     assert!(head.starts_with("HTTP/1.1 204"), "{head}");
     session_ends(&mut page).await;
     assert_eq!(guarded.page_status(&ben).await, 401);
@@ -350,12 +343,12 @@ async fn an_administrator_sees_who_is_logged_in_and_ends_a_session() {
 #[tokio::test]
 async fn a_logout_ends_the_session_and_its_pages() {
     let guarded = Guarded::new().await;
-    let cookie = guarded.login("ben").await;
-    let mut page = guarded.page(&cookie).await;
-    let (head, _) = guarded.post("/logout", &cookie, "").await;
-    assert!(head.contains("Max-Age=0"), "{head}");
+    let shown = guarded.login("ben").await;
+    let mut page = guarded.page(&shown).await;
+    let (head, _) = guarded.post("/logout", ("Authorization", &shown), "").await;
+    assert!(head.starts_with("HTTP/1.1 204"), "{head}");
     session_ends(&mut page).await;
-    assert_eq!(guarded.page_status(&cookie).await, 401);
+    assert_eq!(guarded.page_status(&shown).await, 401);
     until(|| guarded.has_recorded(&["ben", "logout"])).await;
 }
 
@@ -373,8 +366,8 @@ async fn the_sessions_of_a_removed_user_end_and_those_of_others_go_on() {
 #[tokio::test]
 async fn with_an_unusable_users_file_nobody_logs_in_and_those_who_have_still_stop_vehicles() {
     let guarded = Guarded::new().await;
-    let cookie = guarded.login("carl").await;
-    let mut page = guarded.page(&cookie).await;
+    let shown = guarded.login("carl").await;
+    let mut page = guarded.page(&shown).await;
     page.until(|state| driver_of(state)["state"] == "standby")
         .await;
     let good = std::fs::read(guarded.users()).unwrap();
@@ -395,23 +388,23 @@ async fn with_an_unusable_users_file_nobody_logs_in_and_those_who_have_still_sto
     page.ask(stop.clone()).await.unwrap();
     page.until(|state| state["vehicle"]["emergency"] == true)
         .await;
-    let mut again = guarded.page(&cookie).await;
+    let mut again = guarded.page(&shown).await;
     again.ask(stop).await.unwrap();
     std::fs::write(guarded.users(), good).unwrap();
-    within_limit(answers("HTTP/1.1 204")).await;
+    within_limit(answers("HTTP/1.1 200")).await;
     again.state().await;
 }
 
 #[tokio::test]
 async fn the_audit_log_has_no_password_no_cookie_and_no_unknown_name() {
     let guarded = Guarded::new().await;
-    let cookie = guarded.login("anna").await;
-    let (_, secret) = cookie.split_once('=').unwrap();
+    let shown = guarded.login("anna").await;
+    let (_, secret) = shown.split_once(' ').unwrap();
     guarded.try_login("anna", "a-wrong-password").await;
     guarded.try_login("a-password-as-name", "").await;
-    let mut page = guarded.page(&cookie).await;
+    let mut page = guarded.page(&shown).await;
     page.ask(json!({"type": "control", "on": true})).await.ok();
-    guarded.post("/logout", &cookie, "").await;
+    guarded.post("/logout", ("Authorization", &shown), "").await;
     until(|| guarded.has_recorded(&["anna", "logout"])).await;
     assert!(guarded.has_recorded(&["anna", "login", "allowed", "127.0.0.1"]));
     assert!(guarded.has_recorded(&["unknown user", "login", "refused"]));
@@ -426,7 +419,7 @@ async fn malformed_logins_are_refused() {
     let guarded = Guarded::new().await;
     let long = format!("{{\"name\":\"{}\"", "x".repeat(4000));
     for body in ["", "{}", "[]", "\u{0}", "name=anna", &long] {
-        let (head, _) = guarded.post("/login", "", body).await;
+        let (head, _) = guarded.post("/login", ("Cookie", ""), body).await;
         assert!(head.starts_with("HTTP/1.1 400"), "{body}: {head}");
     }
 }

@@ -23,9 +23,7 @@ class Socket extends EventTarget {
 }
 
 Object.assign(globalThis, {
-  location: { protocol: "http:", host: "station" },
   HTMLInputElement: class {},
-  WebSocket: Socket,
 });
 // Newer versions of Node.js have one of their own.
 Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });
@@ -44,6 +42,7 @@ function page({ vehicle = 101, barred = "" } = {}) {
   const link = Object.assign(new EventTarget(), {
     open: true,
     vehicle,
+    socketTo: () => new Socket(),
     send() {},
     ask: (request) => {
       asked.push(request);

@@ -26,13 +26,13 @@ class Socket extends EventTarget {
   }
 }
 
-function rig(token = "") {
+function rig(token = "", answer = "") {
   mock.timers.enable({ apis: ["setTimeout"] });
   const sockets = [];
   const requests = [];
   const link = Object.assign(new EventTarget(), { token, send: (request) => requests.push(request.type) });
   const stops = new StopLink(link, () => {
-    sockets.push(new Socket());
+    sockets.push(Object.assign(new Socket(), { answer }));
     return sockets.at(-1);
   });
   stops.start();
@@ -216,4 +216,23 @@ test("a frame takes 32 octets at most", () => {
   stops.stop(65_535);
   stops.stopAll();
   for (const frame of sent()[0]) assert.ok(frame.length <= 32, frame);
+});
+
+test("who does not prove to be the station confirms and ends no stop", () => {
+  const { stops, sockets, sent } = rig("ticket", "proof");
+  sockets.forEach((socket) => socket.open());
+  stops.stop(7);
+  const press = stops.press.join(".");
+  sockets[0].say(`cleared 7 ${press}`);
+  sockets[1].say("");
+  assert.deepEqual([sockets[0].readyState, sockets[1].readyState], [3, 3]);
+  assert.ok(stops.wants(7));
+  mock.timers.tick(250);
+  sockets[2].open();
+  sockets[2].say("proof");
+  sent();
+  mock.timers.tick(500);
+  assert.deepEqual(sent()[2].slice(0, 1), ["stop 7"]);
+  sockets[2].say(`cleared 7 ${press}`);
+  assert.ok(!stops.wants(7));
 });

@@ -30,6 +30,9 @@ use latest::Latest;
 pub const MOST_CLIENTS: usize = 32;
 /// Pause after an error of the listener, for example too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
+/// The reply to another user of this host: the debug view is closed to them, too.
+const NOT_OURS: &[u8] = b"HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\n\
+    Content-Length: 44\r\nConnection: close\r\n\r\nother users of this host may not watch this\n";
 /// The reply to a connection beyond the limit.
 const NO_PLACE: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\n\
     Content-Length: 46\r\nConnection: close\r\n\r\nthe limit of viewers is reached: close another\n";
@@ -125,11 +128,14 @@ impl Server {
                 Some(_) = tasks.join_next() => continue,
             };
             match accepted {
+                Ok((stream, address)) if is_of_another_user(&stream, address) => {
+                    refuse(&stream, address, NOT_OURS, "a viewer of another user");
+                }
                 Ok((stream, address)) => match places.take(Source::of(address)) {
                     Ok(place) => {
                         tasks.spawn(serve(self.shared.clone(), stream, address, place));
                     }
-                    Err(_) => refuse(&stream, address),
+                    Err(_) => refuse(&stream, address, NO_PLACE, "a viewer too many"),
                 },
                 Err(error) => pause_after(&error).await,
             }
@@ -150,10 +156,15 @@ async fn serve(shared: Arc<Shared>, stream: TcpStream, address: SocketAddr, _pla
     }
 }
 
-fn refuse(stream: &TcpStream, address: SocketAddr) {
-    tracing::info!(%address, "a viewer too many");
+fn is_of_another_user(stream: &TcpStream, peer: SocketAddr) -> bool {
+    let here = stream.local_addr();
+    here.is_ok_and(|here| jaus::link::is_of_another_user(peer, here))
+}
+
+fn refuse(stream: &TcpStream, address: SocketAddr, answer: &[u8], why: &str) {
+    tracing::info!(%address, "{why}");
     // Best effort: never wait for the peer.
-    let _ = stream.try_write(NO_PLACE);
+    let _ = stream.try_write(answer);
 }
 
 #[expect(

@@ -1,6 +1,7 @@
 //! Hostile viewers: each has a defined end, and the others get their samples.
 
 use futures_util::{SinkExt, StreamExt};
+use jaus_test_kit::evidence::{not_tested, this_test};
 use jaus_test_kit::waiting::{until, within_limit};
 use jaus_viewers::MOST_CLIENTS;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -156,4 +157,28 @@ async fn a_viewer_that_never_reads_loses_samples_and_others_lose_none() {
             break;
         }
     }
+}
+
+/// They reach the port of loopback, although the debug view is closed to them.
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn another_user_of_the_host_sees_nothing_and_takes_no_place() {
+    let scene = Scene::new().await;
+    let port = scene.address.port();
+    let ask = format!(
+        "for _ in $(seq {MOST_CLIENTS}); do exec {{c}}<>/dev/tcp/127.0.0.1/{port}; head -1 <&$c; done"
+    );
+    let nobody = ["--reuid=65534", "--regid=65534", "--clear-groups"];
+    let mut command = tokio::process::Command::new("setpriv");
+    let asked = command.args(nobody).args(["bash", "-c", &ask]).output();
+    match within_limit(asked).await {
+        Ok(output) if output.status.success() => {
+            let answers = String::from_utf8_lossy(&output.stdout).into_owned();
+            assert_eq!(answers.lines().count(), MOST_CLIENTS, "{answers}");
+            let is_refused = |it: &str| it.starts_with("HTTP/1.1 403");
+            assert!(answers.lines().all(is_refused), "{answers}");
+        }
+        _ => not_tested(&this_test(), "it takes root, setpriv and bash"),
+    }
+    assert_alive(&scene).await;
 }

@@ -15,6 +15,7 @@ mod input;
 mod keyboard;
 mod pictures;
 mod steps;
+mod stranger;
 pub(crate) mod system;
 mod truth;
 #[cfg(feature = "https")]
@@ -108,6 +109,11 @@ fn control_is_handed_over_between_the_pages_of_two_operators() {
 #[test]
 fn a_page_without_the_token_asks_for_it_or_where_it_may_look_stops_the_vehicle() {
     on_a_station(watching::run);
+}
+
+#[test]
+fn a_program_that_takes_the_port_of_the_page_gets_no_token_and_is_not_believed() {
+    on_a_station(stranger::run);
 }
 
 #[cfg(feature = "https")]
