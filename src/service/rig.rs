@@ -122,6 +122,7 @@ impl Rig {
             sequence,
             path: None,
             to: self.out.source(),
+            acknowledged: false,
         }
     }
 

@@ -368,6 +368,7 @@ impl Stack {
             to: id,
             priority: Priority::Standard,
             broadcast: Broadcast::None,
+            acknowledged: false,
             payload: query.clone(),
             sequence: None,
             path: None,

@@ -51,6 +51,7 @@ impl Rover {
             payload: message.encode().unwrap(),
             sequence: None,
             path: None,
+            acknowledged: false,
         };
         self.sent.clear();
         self.stack.handle_message(self.now, &received);

@@ -324,6 +324,7 @@ impl World {
             payload: message.payload.clone(),
             sequence: None,
             path: None,
+            acknowledged: false,
         };
         let meant = |id: &JausId| *id != message.source && message.destination.matches(*id);
         let attached: Vec<JausId> = self.attached.iter().copied().filter(meant).collect();
