@@ -214,7 +214,7 @@ impl Builder {
             refused_setpoints,
             changes,
             messages,
-            requests: AtomicU8::new(u8::MAX),
+            requests: AtomicU8::new(0),
         };
         tokio::spawn(
             Driver::new(

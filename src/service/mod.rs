@@ -68,6 +68,8 @@ use crate::endpoint::Received;
 pub use crate::codec::{Date, Hazards};
 pub use audience::Audience;
 pub use call::{Call, LaterAnswer};
+#[cfg(feature = "node")]
+pub(crate) use client::OWN_REQUESTS;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
