@@ -62,7 +62,7 @@ pub use message::View;
 pub use message::{AnyMessage, Message, ServiceId};
 #[doc(hidden)]
 pub use query::keep_if;
-pub use query::{Query, Report, report_code};
+pub use query::{Echo, Query, Report, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;

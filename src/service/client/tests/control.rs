@@ -522,7 +522,7 @@ fn a_client_tells_its_incarnation_before_it_requests_control() {
     assert_eq!(
         bench.sent::<QueryIncarnation>(),
         [QueryIncarnation {
-            incarnation,
+            sender_incarnation: incarnation,
             stamp: 0
         }]
     );
@@ -541,7 +541,7 @@ fn control_is_lost_when_the_peer_is_another_incarnation() {
     assert_eq!(news(&mut bench), []);
     // As a component does that has been granted a renewal as if it were a first request.
     let restarted = QueryIncarnation {
-        incarnation: 8,
+        sender_incarnation: 8,
         stamp: 0,
     };
     bench.hear(PEER, &restarted);
