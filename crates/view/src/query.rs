@@ -262,7 +262,7 @@ mod tests {
         let dictionary = Dictionary::new().with_catalogue();
         for (query, report) in [
             ("QueryPlatformMode", 0xFF23),
-            ("QueryCBRNConfiguration", 0xF935),
+            ("QuerySupportedPlatformModes", 0xFF24),
             ("QueryVelocityState", 0x4404),
         ] {
             let request = Request::new(query, serde_json::json!({}));

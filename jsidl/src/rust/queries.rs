@@ -10,7 +10,7 @@ use super::structs::method_names;
 use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
 use crate::fingerprint;
-use crate::heads::echoes;
+use crate::heads::{Echo, echoes};
 use crate::model::Item;
 
 /// Implements `Query` if the message is a query with a report in the set. `shared` has the types
@@ -36,13 +36,22 @@ pub(super) fn implement(
         .as_ref()
         .and_then(|(query, report)| Request::of(query, report));
     out.gap();
-    out.push(format!("impl codec::Query for {} {{", query.ident));
-    out.push(format!("type Report = {path};"));
-    write_echoes(out, query, report);
-    if let Some(request) = request.as_ref().filter(|it| it.drops()) {
-        request.drop_unrequested(out, &path, &format!("{types}::"));
+    let dropping = request.as_ref().filter(|it| it.drops());
+    let echoes = echoes(query.message, report.message);
+    let head = format!(
+        "impl codec::Query for {} {{ type Report = {path};",
+        query.ident
+    );
+    if dropping.is_none() && echoes.is_empty() {
+        out.push(format!("{head} }}"));
+    } else {
+        out.push(head);
+        write_echoes(out, &echoes);
+        if let Some(request) = dropping {
+            request.drop_unrequested(out, &path, &format!("{types}::"));
+        }
+        out.push("}");
     }
-    out.push("}");
     match request {
         Some(Request {
             selections,
@@ -63,8 +72,7 @@ pub(super) fn implement(
     }
 }
 
-fn write_echoes(out: &mut Writer, query: &Plan<'_>, report: &Plan<'_>) {
-    let echoes = echoes(query.message, report.message);
+fn write_echoes(out: &mut Writer, echoes: &[Echo]) {
     if echoes.is_empty() {
         return;
     }

@@ -181,7 +181,7 @@ impl<'a> Generator<'a> {
         if !codes.is_empty() {
             out.gap();
             out.push(format!(
-                "fn answers(&self, query: u16) -> bool {{\n[{}].contains(&query)\n}}",
+                "fn answers(&self, query: u16) -> bool {{ [{}].contains(&query) }}",
                 codes.join(", ")
             ));
         }
