@@ -78,6 +78,7 @@ fn from(source: JausId, payload: Bytes) -> Received {
         payload,
         sequence: None,
         path: None,
+        acknowledged: false,
     }
 }
 

@@ -159,6 +159,6 @@ pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
     println!("ready");
     loop {
         sleep(PERIOD).await;
-        component.changed::<QueryVelocityState>().await;
+        _ = component.changed::<QueryVelocityState>().await;
     }
 }

@@ -93,6 +93,7 @@ impl Story {
                         peer: from.into(),
                     }),
                     payload,
+                    acknowledged: false,
                 };
                 self.gateway.handle_message(self.now, &received);
             }

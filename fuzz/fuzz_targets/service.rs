@@ -176,5 +176,6 @@ fn received(source: JausId, payload: bytes::Bytes, to_all: bool) -> Received {
             peer: std::net::SocketAddr::from(([10, 0, 0, 2], 3794)).into(),
         }),
         payload,
+        acknowledged: false,
     }
 }

@@ -194,12 +194,14 @@ impl Builder {
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
         let (directory, directories) = watch::channel(());
         let (standing, standings) = watch::channel(*stack.standing());
+        let (stop, stopped) = watch::channel(None);
         let refused_setpoints = Arc::new(AtomicU64::new(0));
         let changes = Arc::new(Outlet::new(Shared::CHANGES));
         let messages = Arc::new(Outlet::new(Shared::MESSAGES));
         let publisher = Publisher {
             directory,
             standing,
+            stop,
             refused_setpoints: refused_setpoints.clone(),
             changes: changes.clone(),
             messages: messages.clone(),
@@ -211,10 +213,11 @@ impl Builder {
             known: membership.directory(),
             directories,
             standings,
+            stopped,
             refused_setpoints,
             changes,
             messages,
-            requests: AtomicU8::new(u8::MAX),
+            requests: AtomicU8::new(0),
         };
         tokio::spawn(
             Driver::new(

@@ -9,7 +9,9 @@ use super::clients::{Condition, Ticket};
 use super::{Component, ControlError, ManageError};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::messages::core::{ClearEmergency, QueryStatus, Reset, Resume, SetEmergency, Standby};
+use crate::messages::core::{
+    ClearEmergency, QueryStatus, ReleaseControl, Reset, Resume, SetEmergency, Standby,
+};
 use crate::node::now;
 use crate::service::{CLEAR_ALL, State};
 use crate::wire::Priority;
@@ -44,7 +46,7 @@ const STATE_PAUSE: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 pub struct Control {
     /// Dropped before the component.
-    ticket: Ticket,
+    _ticket: Ticket,
     component: Component,
     peer: JausId,
     condition: watch::Receiver<Condition>,
@@ -60,7 +62,7 @@ impl Control {
         condition: watch::Receiver<Condition>,
     ) -> Self {
         Self {
-            ticket,
+            _ticket: ticket,
             component,
             peer,
             condition,
@@ -162,12 +164,10 @@ impl Control {
     /// Releases control, and waits until the peer confirms or the release times out. Dropping does
     /// the same without waiting.
     pub async fn release(self) {
-        let Self {
-            ticket,
-            mut condition,
-            ..
-        } = self;
-        drop(ticket);
+        let mut condition = self.condition.clone();
+        // The component lives until the end.
+        let _component = self.component.clone();
+        drop(self);
         let ended = |now: &Condition| *now == Condition::Released;
         // An error means that the component has stopped, which has released control.
         let _ = condition.wait_for(ended).await;
@@ -212,7 +212,23 @@ impl Control {
     }
 }
 
+impl Drop for Control {
+    fn drop(&mut self) {
+        if self.is_held() {
+            self.component.release_now(self.peer);
+        }
+    }
+}
+
 impl Component {
+    /// Sends a release at once. The component's task repeats it until it is confirmed; but at the end of
+    /// `main` that task does not run any more.
+    pub(super) fn release_now(&self, peer: JausId) {
+        if self.send(peer, &ReleaseControl {}).is_ok() {
+            self.shared.sender.flush();
+        }
+    }
+
     /// Sets an emergency at a peer that offers Management, which stops it until this component
     /// calls [`clear_emergency`](Self::clear_emergency). Waits until the peer reports the
     /// emergency. This needs no control.

@@ -11,6 +11,7 @@ use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
+use super::StopReason;
 use super::clients::{Clients, Hold, Instruction};
 use super::directories::Membership;
 use super::latest::LatestSender;
@@ -22,7 +23,7 @@ use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident, now, sleep_until};
 use crate::service::{
     Change, Condition, Event, Inquiry, NoAnswer, NotPublished, Patience, Publication, QueryOptions,
-    Service, Stack, Standing, UnsafeService,
+    Question, Service, Stack, Standing, State, UnsafeService,
 };
 
 /// A request of the application to its component's task. What is large is boxed, because every
@@ -49,8 +50,7 @@ pub(super) enum Command {
 /// A query, and where its result goes.
 pub(super) struct Ask {
     pub(super) peer: JausId,
-    pub(super) query: Bytes,
-    pub(super) report: u16,
+    pub(super) question: Question,
     pub(super) options: QueryOptions,
     pub(super) reply: oneshot::Sender<Answer>,
 }
@@ -68,13 +68,24 @@ pub(super) struct Publisher {
     /// Wakes tasks that wait for a change of the directory.
     pub(super) directory: watch::Sender<()>,
     pub(super) standing: watch::Sender<Standing>,
+    pub(super) stop: watch::Sender<Option<StopReason>>,
     pub(super) refused_setpoints: Arc<AtomicU64>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
 }
 
 impl Drop for Publisher {
+    /// Also runs when a service panics.
     fn drop(&mut self) {
+        let (reason, state) = match std::thread::panicking() {
+            true => (StopReason::Panicked, State::Failure),
+            false => (StopReason::Ended, State::Shutdown),
+        };
+        self.standing.send_modify(|standing| {
+            standing.state = state;
+            standing.controller = None;
+        });
+        self.stop.send_replace(Some(reason));
         self.changes.end();
         self.messages.end();
     }
@@ -206,14 +217,13 @@ impl Driver {
     fn ask(&mut self, ask: Ask) {
         let Ask {
             peer,
-            query,
-            report,
+            question,
             mut options,
             reply,
         } = ask;
         let now = now();
         options.patience.get_or_insert(self.patience);
-        let inquiry = self.stack.ask(now, peer, query, report, options);
+        let inquiry = self.stack.ask(now, peer, question, options);
         match self.transmit() {
             Ok(()) => {
                 self.waiting.insert(inquiry, reply);

@@ -8,7 +8,7 @@ use crate::codec::{DecodeError, EncodeError, OutOfRange};
 use crate::node;
 use crate::service::{
     CannotSubscribe, ControlLost, ControlRefused, NoAnswer, NotPublished, Offer, SessionState,
-    State, SubscriptionEnd,
+    State, SubscriptionEnd, UnsafeService,
 };
 
 /// Why a message was not sent.
@@ -21,6 +21,33 @@ pub enum SendError {
     /// The node rejected it.
     #[error(transparent)]
     Node(#[from] node::SendError),
+}
+
+/// The component has stopped; [`Component::stopped`](super::Component::stopped) says why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the component has stopped")]
+pub struct Stopped;
+
+/// Why a component has stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// Its node or its runtime was stopped.
+    Ended,
+    /// One of its services has panicked. What it moved was stopped, and its peers see it leave.
+    Panicked,
+}
+
+/// Why a service is not offered.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum OfferError {
+    /// The component lacks what makes it safe.
+    #[error(transparent)]
+    Unsafe(#[from] UnsafeService),
+    /// The component has stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// Why the delivery of a message is not confirmed.

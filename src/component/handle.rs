@@ -14,16 +14,16 @@ use super::latest::LatestSender;
 use super::offers::missing_for;
 use super::watch::Outlet;
 use super::{
-    Builder, Control, ControlError, DeliverError, FromReport, Messages, PublishError, QueryError,
-    SendError, SubscribeError, Subscription, Watch,
+    Builder, Control, ControlError, DeliverError, FromReport, Messages, OfferError, PublishError,
+    QueryError, SendError, StopReason, Stopped, SubscribeError, Subscription, Watch,
 };
 use crate::address::JausId;
-use crate::codec::{Message, Query, Report};
+use crate::codec::{Echo, Message, Query, Report};
 use crate::endpoint::{Outgoing, Received};
 use crate::messages;
 use crate::service::{
     Change, Condition, Directory, Kind, LaterAnswer, NodeDirectory, Publication, QueryOptions,
-    Service, Standing, Topic, UnsafeService, When, code_of,
+    Question, Service, Standing, Topic, When,
 };
 use crate::wire::Priority;
 
@@ -54,6 +54,7 @@ pub(super) struct Shared {
     pub(super) known: Arc<NodeDirectory>,
     pub(super) directories: watch::Receiver<()>,
     pub(super) standings: watch::Receiver<Standing>,
+    pub(super) stopped: watch::Receiver<Option<StopReason>>,
     pub(super) refused_setpoints: Arc<AtomicU64>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
@@ -113,14 +114,27 @@ impl Component {
         self.shared.refused_setpoints.load(Relaxed)
     }
 
+    /// Waits until the component has stopped, and says why. From then on its [`standing`](Self::standing)
+    /// is that of a component that is shut down or has failed, and the other methods return `Stopped`.
+    pub async fn stopped(&self) -> StopReason {
+        let mut stopped = self.shared.stopped.clone();
+        // The sender says why before it goes.
+        let reason = stopped.wait_for(Option::is_some).await;
+        reason.ok().and_then(|it| *it).unwrap_or(StopReason::Ended)
+    }
+
+    /// Passes a command to the component's task.
+    async fn command(&self, command: Command) -> Result<(), Stopped> {
+        let sent = self.shared.commands.send(command).await;
+        sent.map_err(|_| Stopped)
+    }
+
     /// Sets the condition of this component, which Management reports to clients.
-    pub async fn set_condition(&self, condition: Condition) {
-        // An error means that the component has stopped.
-        let _ = self
-            .shared
-            .commands
-            .send(Command::Condition(condition))
-            .await;
+    ///
+    /// # Errors
+    /// If the component has stopped.
+    pub async fn set_condition(&self, condition: Condition) -> Result<(), Stopped> {
+        self.command(Command::Condition(condition)).await
     }
 
     /// Publishes a report: queries are answered with it from now on, subscribers on change get it
@@ -140,26 +154,26 @@ impl Component {
         let publication = Publication::new(report, sampled_at);
         let (reply, taken) = oneshot::channel();
         let command = Command::Publish(publication, reply);
-        let sent = self.shared.commands.send(command).await;
+        let sent = self.command(command).await;
         sent.map_err(|_| PublishError::Stopped)?;
         Ok(taken.await.map_err(|_| PublishError::Stopped)??)
     }
 
     /// Notifies the subscribers of the query `Q` that its answer has changed.
-    pub async fn changed<Q: Query>(&self) {
-        // As in `set_condition`.
-        let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
+    ///
+    /// # Errors
+    /// If the component has stopped.
+    pub async fn changed<Q: Query>(&self) -> Result<(), Stopped> {
+        self.command(Command::Announce(Q::CODE)).await
     }
 
     /// Reports that the last accepted command of type `C` has ended, and whether it was successful.
     /// For services that [`tell_end_of`](crate::service::Handlers::tell_end_of) it.
-    pub async fn ended<C: Message>(&self, successful: bool) {
-        // As in `set_condition`.
-        let _ = self
-            .shared
-            .commands
-            .send(Command::End(C::CODE, successful))
-            .await;
+    ///
+    /// # Errors
+    /// If the component has stopped.
+    pub async fn ended<C: Message>(&self, successful: bool) -> Result<(), Stopped> {
+        self.command(Command::End(C::CODE, successful)).await
     }
 
     /// The changes of the directory from now on.
@@ -274,7 +288,7 @@ impl Component {
         peer: JausId,
         query: &Q,
     ) -> Result<Q::Report, QueryError> {
-        self.request_with(options, peer, query).await
+        self.ask_for(options, peer, query, Some(Q::ECHOES)).await
     }
 
     /// Like [`query`](Self::query), for a message whose answer does not follow from its type: a
@@ -302,13 +316,28 @@ impl Component {
         peer: JausId,
         message: &M,
     ) -> Result<R, QueryError> {
+        self.ask_for(options, peer, message, None).await
+    }
+
+    async fn ask_for<R: Message, M: Message>(
+        &self,
+        options: QueryOptions,
+        peer: JausId,
+        message: &M,
+        echoes: Option<&'static [Echo]>,
+    ) -> Result<R, QueryError> {
         let names = (M::NAME, R::NAME);
         let query = message.encode().map_err(|error| QueryError::NotSent {
             peer,
             query: M::NAME,
             source: error.into(),
         })?;
-        let octets = self.ask(options, peer, query, R::CODE, names).await?;
+        let question = Question::new(query, R::CODE);
+        let question = match echoes {
+            Some(echoes) => question.echoing(echoes),
+            None => question,
+        };
+        let octets = self.ask(options, peer, question, names).await?;
         R::decode(&octets).map_err(|source| QueryError::Unreadable {
             peer,
             query: M::NAME,
@@ -316,18 +345,16 @@ impl Component {
         })
     }
 
-    /// Sends a query, beginning with its message code, and waits for the report with the code
-    /// `report`. The names are those of the query and of the report.
+    /// Asks a question, and waits for its answer. The names are those of the query and of the report.
     pub(super) async fn ask(
         &self,
         options: QueryOptions,
         peer: JausId,
-        query: Bytes,
-        report: u16,
+        question: Question,
         names: (&'static str, &'static str),
     ) -> Result<Bytes, QueryError> {
         let (name, report_name) = names;
-        let code = code_of(&query).unwrap_or_default();
+        let code = question.code();
         let directory = self.directory();
         let services = directory.component(peer).map_or_else(Vec::new, |peer| {
             missing_for(&messages::registry(), peer, code)
@@ -342,12 +369,11 @@ impl Component {
         let (reply, answer) = oneshot::channel();
         let command = Command::Ask(Box::new(Ask {
             peer,
-            query,
-            report,
+            question,
             options,
             reply,
         }));
-        let sent = self.shared.commands.send(command).await;
+        let sent = self.command(command).await;
         sent.map_err(|_| QueryError::Stopped)?;
         match answer.await.map_err(|_| QueryError::Stopped)? {
             Answer::Report(octets) => Ok(octets),
@@ -435,25 +461,27 @@ impl Component {
     pub(super) async fn hold<T>(&self, hold: impl FnOnce(oneshot::Sender<T>) -> Hold) -> Option<T> {
         let (reply, answer) = oneshot::channel();
         let command = Command::Hold(Box::new(hold(reply)));
-        self.shared.commands.send(command).await.ok()?;
+        self.command(command).await.ok()?;
         answer.await.ok()
     }
 
-    /// Offers another service, and notifies the peers. Has no effect if the component has stopped.
+    /// Offers another service, and notifies the peers.
     ///
     /// # Errors
-    /// If the component lacks what the service needs to be [safe](UnsafeService).
-    pub async fn offer(&self, service: impl Service + 'static) -> Result<(), UnsafeService> {
+    /// If the component lacks what the service needs to be [safe](crate::service::UnsafeService), or has
+    /// stopped.
+    pub async fn offer(&self, service: impl Service + 'static) -> Result<(), OfferError> {
         let (reply, answer) = oneshot::channel();
-        let command = Command::Offer(Box::new(service), reply);
-        // An error, here and below, means that the component has stopped.
-        let _ = self.shared.commands.send(command).await;
-        answer.await.unwrap_or(Ok(()))
+        self.command(Command::Offer(Box::new(service), reply))
+            .await?;
+        Ok(answer.await.map_err(|_| Stopped)??)
     }
 
     /// Withdraws a service, in all its versions, and notifies the peers.
-    pub async fn withdraw(&self, urn: &'static str) {
-        // As in `set_condition`.
-        let _ = self.shared.commands.send(Command::Withdraw(urn)).await;
+    ///
+    /// # Errors
+    /// If the component has stopped.
+    pub async fn withdraw(&self, urn: &'static str) -> Result<(), Stopped> {
+        self.command(Command::Withdraw(urn)).await
     }
 }

@@ -46,6 +46,11 @@ impl LatestSender {
         self.sender.send(message)
     }
 
+    /// Passes the messages sent so far to the operating system.
+    pub(super) fn flush(&self) {
+        self.sender.flush();
+    }
+
     /// Sends a message, and waits until it is acknowledged or superseded.
     pub(super) async fn deliver(&self, message: Outgoing) -> Result<(), Undelivered> {
         self.supersede(&message);

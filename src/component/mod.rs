@@ -106,8 +106,8 @@ pub use clocks::PeerClocks;
 pub use command::RunningCommand;
 pub use control::Control;
 pub use error::{
-    ControlError, DeliverError, FindError, ManageError, PublishError, QueryError, RequestError,
-    SendError, SessionError, SubscribeError,
+    ControlError, DeliverError, FindError, ManageError, OfferError, PublishError, QueryError,
+    RequestError, SendError, SessionError, StopReason, Stopped, SubscribeError,
 };
 pub use group::{GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;

@@ -9,15 +9,16 @@ use super::{Component, Messages, RequestError};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
+use crate::service::OWN_REQUESTS;
 
 /// Time limit of a confirmation.
 const LIMIT: Duration = Duration::from_secs(3);
 
 impl Component {
-    /// A number for a request. It differs from those of the requests just before it.
+    /// A number for a request. It differs from those of the requests just before it, and from those of
+    /// subscriptions.
     pub(super) fn next_request(&self) -> u8 {
-        // Subscriptions count upwards.
-        self.shared.requests.fetch_sub(1, Ordering::Relaxed)
+        OWN_REQUESTS | self.shared.requests.fetch_add(1, Ordering::Relaxed)
     }
 
     /// Delivers a request, and waits until `read` finds its answer in a message of the peer.

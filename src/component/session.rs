@@ -174,10 +174,10 @@ impl Session {
     /// Releases control, and waits until the peer confirms or the release times out. Dropping does
     /// the same without waiting.
     pub async fn release(self) {
-        let Self {
-            ticket, mut state, ..
-        } = self;
-        drop(ticket);
+        let mut state = self.state.clone();
+        // The component lives until the end.
+        let _component = self.component.clone();
+        drop(self);
         // An error means that the component has stopped, which has released control.
         let _ = state.wait_for(|it| *it == SessionState::Released).await;
     }
@@ -198,6 +198,14 @@ impl Session {
         end(state)
             .unwrap_or(Err(state))
             .map_err(SessionError::State)
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if let Some(peer) = self.state().held() {
+            self.component.release_now(peer);
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
 use crate::address::JausId;
 use crate::endpoint::Outgoing;
 use crate::messages;
-use crate::service::{QueryOptions, Topic, code_of};
+use crate::service::{QueryOptions, Question, Topic, code_of};
 use crate::wire::Priority;
 
 impl Component {
@@ -67,7 +67,8 @@ impl Component {
             name_of(code).unwrap_or("the query"),
             name_of(report).unwrap_or("its report"),
         );
-        self.ask(options, peer, query, report, names).await
+        self.ask(options, peer, Question::new(query, report), names)
+            .await
     }
 
     /// Subscribes to a topic whose messages need no types, and yields its reports

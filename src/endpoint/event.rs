@@ -89,6 +89,8 @@ pub struct Received {
     pub path: Option<Path>,
     /// The local component that receives it.
     pub to: JausId,
+    /// Whether its sender asked for an acknowledgement and got it, so that it does not send it again.
+    pub acknowledged: bool,
 }
 
 /// An event that an endpoint reports to its owner.

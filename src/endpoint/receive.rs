@@ -182,11 +182,8 @@ impl Endpoint {
                 }
                 Acknowledgement::Request => {
                     let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
-                    if may_be_refused
-                        && !sink.has_room(frame.destination, frame.flags.priority())
-                        && !self.is_repeat(arrival, seen)
-                    {
-                        return Err(Counter::ReceiverBusy);
+                    if may_be_refused && !self.is_repeat(arrival, seen) {
+                        self.check_room(arrival, sink)?;
                     }
                     self.acknowledge(arrival);
                 }
@@ -225,6 +222,15 @@ impl Endpoint {
             return Ok(());
         }
         self.put_together(arrival, broadcast, sink)
+    }
+
+    /// Checks that a message to be acknowledged will be kept.
+    fn check_room(&self, arrival: Arrival<'_>, sink: &dyn Sink) -> Result<(), Counter> {
+        let frame = arrival.frame;
+        if !sink.has_room(frame.destination, frame.flags.priority()) {
+            return Err(Counter::ReceiverBusy);
+        }
+        self.reassembly.check_length(arrival)
     }
 
     /// Processes an acknowledgement. An unawaited one neither teaches nor moves a route. Sequence
@@ -310,6 +316,8 @@ impl Endpoint {
     ) -> Result<(), Counter> {
         let Arrival { frame, path, .. } = arrival;
         let source = frame.source;
+        let acknowledged = frame.destination.is_unicast()
+            && frame.flags.acknowledgement() == Acknowledgement::Request;
         let received = |destination, priority, broadcast, sequence, payload| Received {
             source,
             destination,
@@ -319,6 +327,7 @@ impl Endpoint {
             payload,
             path: Some(path),
             to: destination,
+            acknowledged,
         };
         let is_single = frame.flags.data() == DataControl::Single;
         let large = if is_single {

@@ -64,6 +64,7 @@ impl Endpoint {
                 payload: denial.payload,
                 path: None,
                 to: denial.destination,
+                acknowledged: false,
             });
         }
     }

@@ -371,5 +371,6 @@ fn received_locally(message: Outgoing, broadcast: Broadcast) -> Received {
         payload: message.payload,
         path: None,
         to: message.destination,
+        acknowledged: message.acknowledge,
     }
 }

@@ -17,7 +17,8 @@ pub trait Sink {
     /// so that its sender retries.
     fn has_room(&self, to: JausId, priority: Priority) -> bool;
 
-    /// Delivers a message to the component [`Received::to`].
+    /// Delivers a message to the component [`Received::to`]. One that was
+    /// [acknowledged](Received::acknowledged) must stay until it is read, whatever comes later.
     fn deliver(&mut self, message: Received);
 
     /// Notes that a part of a large message from `source` has arrived, which is not complete yet.

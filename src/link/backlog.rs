@@ -3,7 +3,8 @@
 //!
 //! Both ends of a node use it: a link while the network is busy, and a component's mailbox while it
 //! does not read. **When it is full, it drops the oldest item of the lowest priority present**. If
-//! all waiting items are more urgent than the new one, it drops the new one.
+//! all waiting items are more urgent than the new one, it drops the new one. Items that must stay, such as
+//! acknowledged messages, are never dropped; whoever adds them asks for room before.
 
 use std::collections::VecDeque;
 
@@ -22,11 +23,24 @@ pub struct Bounds {
 #[derive(Debug)]
 pub struct Backlog<T> {
     bounds: Bounds,
-    /// By priority, low first: the items, each with its octets.
-    levels: [VecDeque<(usize, T)>; LEVELS],
-    /// Octets of the items of each level.
-    octets: [usize; LEVELS],
+    /// By priority, low first.
+    levels: [Level<T>; LEVELS],
+    /// The number of the next item.
+    next: u64,
 }
+
+/// The items of one priority.
+#[derive(Debug)]
+struct Level<T> {
+    /// Those that may be dropped, and those that must stay: the number of each, by which they are in
+    /// order, and its octets.
+    items: [VecDeque<(u64, usize, T)>; 2],
+    octets: [usize; 2],
+}
+
+/// The place, in a level, of items that may be dropped, and of those that must stay.
+const LOOSE: usize = 0;
+const FIRM: usize = 1;
 
 const LEVELS: usize = Priority::ALL.len();
 
@@ -41,20 +55,20 @@ impl<T> Backlog<T> {
         Self {
             bounds,
             levels: Default::default(),
-            octets: [0; LEVELS],
+            next: 0,
         }
     }
 
     /// Items that wait.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.levels.iter().map(VecDeque::len).sum()
+        self.levels.iter().map(Level::len).sum()
     }
 
     /// Octets of all items that wait.
     #[must_use]
     pub fn octets(&self) -> usize {
-        self.octets.iter().sum()
+        self.levels.iter().flat_map(|level| level.octets).sum()
     }
 
     /// Whether nothing waits.
@@ -69,22 +83,34 @@ impl<T> Backlog<T> {
         self.len() + items <= self.bounds.items && self.octets() <= self.bounds.octets / 2
     }
 
-    /// Whether items of this or a higher priority take less than half of the room. The other half
-    /// is a reserve for items that are pushed without this check.
+    /// Whether items of this or a higher priority that must stay take less than half of the room. The
+    /// other half is for items that may be dropped.
     #[must_use]
     pub fn has_reserve(&self, priority: Priority) -> bool {
-        let level = usize::from(priority.bits());
-        let items: usize = self.levels[level..].iter().map(VecDeque::len).sum();
-        let octets: usize = self.octets[level..].iter().sum();
+        let levels = &self.levels[usize::from(priority.bits())..];
+        let items: usize = levels.iter().map(|it| it.items[FIRM].len()).sum();
+        let octets: usize = levels.iter().map(|it| it.octets[FIRM]).sum();
         items < self.bounds.items.div_ceil(2) && octets <= self.bounds.octets / 2
     }
 
     /// Adds an item; returns how many items were dropped for it.
     #[must_use]
     pub fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
-        let level = usize::from(priority.bits());
-        self.levels[level].push_back((octets, item));
-        self.octets[level] += octets;
+        self.push_to(LOOSE, priority, octets, item)
+    }
+
+    /// Adds an item that stays until it is taken, whatever is added later: see
+    /// [`has_reserve`](Self::has_reserve). Returns how many others were dropped for it.
+    #[must_use]
+    pub fn push_firm(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
+        self.push_to(FIRM, priority, octets, item)
+    }
+
+    fn push_to(&mut self, place: usize, priority: Priority, octets: usize, item: T) -> u64 {
+        let level = &mut self.levels[usize::from(priority.bits())];
+        level.items[place].push_back((self.next, octets, item));
+        level.octets[place] += octets;
+        self.next += 1;
         let mut dropped = 0;
         while self.is_overfull() && self.drop_least() {
             dropped += 1;
@@ -95,33 +121,62 @@ impl<T> Backlog<T> {
     /// The item that [`pop`](Self::pop) removes next.
     #[must_use]
     pub fn first(&self) -> Option<&T> {
-        let (_, first) = self.levels.iter().rev().find_map(VecDeque::front)?;
+        let level = self.levels.iter().rev().find(|it| it.len() > 0)?;
+        let (_, _, first) = level.items[level.first()].front()?;
         Some(first)
     }
 
     /// Removes the oldest item of the highest priority.
     pub fn pop(&mut self) -> Option<T> {
-        (0..LEVELS).rev().find_map(|level| self.pop_from(level))
+        let mut levels = self.levels.iter_mut().rev();
+        levels.find_map(|level| level.pop(level.first()))
     }
 
-    /// Drops the oldest item of the lowest priority; returns whether there was one.
+    /// Drops the oldest of the items of the lowest priority that may be dropped; returns whether there was
+    /// one.
     pub fn drop_least(&mut self) -> bool {
-        (0..LEVELS).any(|level| self.pop_from(level).is_some())
-    }
-
-    fn pop_from(&mut self, level: usize) -> Option<T> {
-        let items = &mut self.levels[level];
-        let (octets, item) = items.pop_front()?;
-        self.octets[level] -= octets;
-        if items.is_empty() && items.capacity() > 2 * KEPT {
-            items.shrink_to(KEPT);
-        }
-        Some(item)
+        let mut levels = self.levels.iter_mut();
+        levels.any(|level| level.pop(LOOSE).is_some())
     }
 
     fn is_overfull(&self) -> bool {
         let items = self.len();
         items > 1 && (items > self.bounds.items || self.octets() > self.bounds.octets)
+    }
+}
+
+impl<T> Default for Level<T> {
+    fn default() -> Self {
+        Self {
+            items: Default::default(),
+            octets: Default::default(),
+        }
+    }
+}
+
+impl<T> Level<T> {
+    fn len(&self) -> usize {
+        self.items.iter().map(VecDeque::len).sum()
+    }
+
+    /// The place of the oldest item.
+    fn first(&self) -> usize {
+        let number = |place: usize| self.items[place].front().map(|it| it.0);
+        match (number(LOOSE), number(FIRM)) {
+            (Some(loose), Some(firm)) if firm < loose => FIRM,
+            (None, _) => FIRM,
+            _ => LOOSE,
+        }
+    }
+
+    fn pop(&mut self, place: usize) -> Option<T> {
+        let items = &mut self.items[place];
+        let (_, octets, item) = items.pop_front()?;
+        self.octets[place] -= octets;
+        if items.is_empty() && items.capacity() > 2 * KEPT {
+            items.shrink_to(KEPT);
+        }
+        Some(item)
     }
 }
 
@@ -183,5 +238,24 @@ mod tests {
         );
         assert_eq!(push(&mut backlog, Priority::Standard, "next"), 1);
         assert_eq!(drain(&mut backlog), ["next"]);
+    }
+
+    #[test]
+    fn what_must_stay_stays_and_comes_in_order() {
+        let mut backlog = backlog(4, 1000);
+        let firm = |backlog: &mut Backlog<&'static str>, text: &'static str| {
+            assert!(backlog.has_reserve(Priority::Standard));
+            backlog.push_firm(Priority::Standard, text.len(), text)
+        };
+        assert_eq!(firm(&mut backlog, "one"), 0);
+        assert_eq!(push(&mut backlog, Priority::Standard, "two"), 0);
+        assert_eq!(firm(&mut backlog, "three"), 0);
+        assert!(!backlog.has_reserve(Priority::Standard), "half is taken");
+        assert!(backlog.has_reserve(Priority::High), "a stop gets in");
+        assert_eq!(push(&mut backlog, Priority::High, "four"), 0);
+        assert_eq!(backlog.first(), Some(&"four"));
+        assert_eq!(push(&mut backlog, Priority::High, "five"), 1, "two");
+        assert_eq!(push(&mut backlog, Priority::Low, "six"), 1, "itself");
+        assert_eq!(drain(&mut backlog), ["four", "five", "one", "three"]);
     }
 }

@@ -245,6 +245,13 @@ impl Core {
         Ok(result?)
     }
 
+    /// Sends what was gathered of a burst.
+    pub(super) fn send_gathered(&mut self) {
+        if self.pump(now()) {
+            self.wake_driver();
+        }
+    }
+
     /// Passes decisions on messages of plain links to the recorder.
     pub(super) fn record_decisions(&mut self, recorder: Recorder) {
         self.endpoint.record_decisions();

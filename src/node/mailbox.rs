@@ -1,8 +1,9 @@
 //! The mailbox of a component or tap: a bounded queue of unread messages, most urgent first.
 //!
 //! A component that does not read must not block the node, so a full mailbox drops messages. **It
-//! drops the oldest message of the lowest priority present**. If all waiting messages are more
-//! urgent than the new one, it drops the new one. Every drop is counted.
+//! drops the oldest unacknowledged message of the lowest priority present**. If all of these are more
+//! urgent than the new one, it drops the new one. Every drop is counted. An acknowledged message stays
+//! until it is read: it is refused before it is acknowledged if there is no room.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
@@ -81,9 +82,13 @@ struct Inner<T> {
 }
 
 impl Mailbox {
-    /// Queues a message.
+    /// Queues a message. One that was acknowledged stays until it is read.
     pub(super) fn deliver(&self, message: Received) {
-        self.push(message.priority, message.payload.len(), message);
+        let push = match message.acknowledged {
+            true => Backlog::push_firm,
+            false => Backlog::push,
+        };
+        self.push_by(push, message.priority, message.payload.len(), message);
     }
 
     /// Notes that a part of an unfinished message has arrived from a peer.
@@ -110,8 +115,8 @@ impl Mailbox {
         inner.messages.is_empty() || inner.messages.has_room(messages)
     }
 
-    /// Whether a message that is acknowledged now is sure to stay until it is read: the other half
-    /// of the room is for messages that cannot be refused.
+    /// Whether there is room for one more message that is acknowledged: the other half of the room is
+    /// for messages that cannot be refused.
     pub(super) fn has_reserve(&self, priority: Priority) -> bool {
         self.lock().messages.has_reserve(priority)
     }
@@ -146,9 +151,19 @@ impl<T> Mailbox<T> {
     }
 
     pub(super) fn push(&self, priority: Priority, octets: usize, message: T) {
+        self.push_by(Backlog::push, priority, octets, message);
+    }
+
+    fn push_by(
+        &self,
+        push: fn(&mut Backlog<T>, Priority, usize, T) -> u64,
+        priority: Priority,
+        octets: usize,
+        message: T,
+    ) {
         let mut inner = self.lock();
         inner.delivered += 1;
-        inner.dropped += inner.messages.push(priority, octets, message);
+        inner.dropped += push(&mut inner.messages, priority, octets, message);
         inner.wake();
     }
 
@@ -239,6 +254,7 @@ mod tests {
             payload: Bytes::from_static(b"12345678"),
             sequence: None,
             path: None,
+            acknowledged: false,
         }
     }
 
@@ -250,7 +266,10 @@ mod tests {
         });
         let mut acknowledged = 0;
         while mailbox.has_reserve(Priority::Standard) {
-            mailbox.deliver(message(Priority::Standard));
+            mailbox.deliver(Received {
+                acknowledged: true,
+                ..message(Priority::Standard)
+            });
             acknowledged += 1;
         }
         (0..4).for_each(|_| mailbox.deliver(message(Priority::Standard)));
@@ -259,6 +278,15 @@ mod tests {
             mailbox.has_reserve(Priority::SafetyCritical),
             "a stop gets in"
         );
+        let other = Received {
+            payload: Bytes::from_static(b"other"),
+            ..message(Priority::Standard)
+        };
+        (0..1000).for_each(|_| mailbox.deliver(other.clone()));
+        let read: Vec<_> = std::iter::from_fn(|| mailbox.pop()).collect();
+        let is_kept = |it: &&Received| it.payload == message(Priority::Standard).payload;
+        assert_eq!(read.iter().filter(is_kept).count(), acknowledged);
+        assert_eq!(read.len(), 8);
     }
 
     #[test]

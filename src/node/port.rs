@@ -239,6 +239,14 @@ impl Sender {
         outcome.unwrap_or(Err(Undelivered::Lost))
     }
 
+    /// Passes the messages of a burst to the operating system without waiting for the node's task. Without
+    /// effect for the node of another process.
+    pub(crate) fn flush(&self) {
+        if let Attachment::Here(shared) = &self.way {
+            shared.lock().send_gathered();
+        }
+    }
+
     /// Waits until all messages sent so far are written to the connection to the host's node, or it
     /// is lost. For a node of the same process, returns at once.
     pub async fn flushed(&self) {

@@ -296,6 +296,7 @@ mod tests {
             payload: vec![0, 0, number].into(),
             sequence: None,
             path: None,
+            acknowledged: false,
         }
     }
 

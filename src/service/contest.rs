@@ -126,6 +126,7 @@ fn request(source: JausId, hex: &str) -> Received {
         payload: octets(hex),
         sequence: None,
         path: None,
+        acknowledged: false,
     }
 }
 

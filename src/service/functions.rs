@@ -50,6 +50,7 @@ impl<Q: Query> Function for Latest<Q> {
 pub struct Functions {
     offers: Vec<ServiceId>,
     by_code: BTreeMap<u16, Vec<Layout>>,
+    queries: BTreeSet<u16>,
     declined: BTreeSet<u16>,
     stops: Vec<Stop>,
     hazards: Hazards,
@@ -106,7 +107,7 @@ impl Handlers {
     /// ```
     #[must_use]
     pub fn publishes<Q: Query>(mut self) -> Self {
-        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, Latest::<Q>::new());
+        self.handle_query::<Q>(Latest::<Q>::new());
         self
     }
 
@@ -119,7 +120,7 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> Q::Report + Send + 'static,
     ) -> Self {
-        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, move |call: &mut Call<'_>| {
+        self.handle_query::<Q>(move |call: &mut Call<'_>| {
             call.answer(|query, _| Some(function(query)))
         });
         self
@@ -239,6 +240,11 @@ impl Handlers {
         self
     }
 
+    fn handle_query<Q: Query>(&mut self, function: impl Function + 'static) {
+        self.provider.queries.insert(Q::CODE);
+        self.handle::<Q>(Q::Report::OTHER_LAYOUTS, function);
+    }
+
     /// Sets the handler of a layout, after those of other layouts with the same code. `reports` are
     /// the services with another layout of the report.
     fn handle<M: Message>(
@@ -305,6 +311,10 @@ impl<'a> codec::Provider<Call<'a>> for Functions {
     fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
         let is_known = |code: &u16| self.by_code.contains_key(code) || self.declined.contains(code);
         unanswered_query(&self.offers, is_known)
+    }
+
+    fn answers(&self, query: u16) -> bool {
+        self.queries.contains(&query)
     }
 
     fn receive(&mut self, code: u16, call: &mut Call<'a>) -> Option<Result<(), DecodeError>> {

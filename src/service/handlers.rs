@@ -270,6 +270,10 @@ where
         self.provider.unanswered_query()
     }
 
+    fn answers(&self, query: u16) -> bool {
+        self.provider.answers(query)
+    }
+
     fn tells_end_of(&self, command: u16) -> bool {
         self.reported.contains(&command)
     }

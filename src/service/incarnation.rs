@@ -39,7 +39,7 @@ impl Incarnation {
     #[must_use]
     pub fn told_in(payload: &Bytes) -> Option<Self> {
         let number = match code_of(payload)? {
-            QueryIncarnation::CODE => QueryIncarnation::decode(payload).ok()?.incarnation,
+            QueryIncarnation::CODE => QueryIncarnation::decode(payload).ok()?.sender_incarnation,
             ReportIncarnation::CODE => ReportIncarnation::decode(payload).ok()?.incarnation,
             _ => return None,
         };
@@ -58,7 +58,7 @@ impl Incarnation {
     /// matter.
     pub(in crate::service) const fn query(self, stamp: u32) -> QueryIncarnation {
         QueryIncarnation {
-            incarnation: self.number(),
+            sender_incarnation: self.number(),
             stamp,
         }
     }

@@ -1,5 +1,16 @@
 //! The application's queries to other components: repeated on timeout, failed after the last try,
 //! and sent one at a time where answers would be ambiguous.
+//!
+//! A report does not say which query it answers. What tells them apart are the numbers that both have in
+//! common ([`Echo`]), and the time: each try of a query may still be answered after the query has ended, so
+//! the next one waits for these answers, or for as long as the peer takes.
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "virtual time starts at any instant"
+)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -8,7 +19,9 @@ use bytes::Bytes;
 
 use super::{Outbox, code_of};
 use crate::address::JausId;
+use crate::codec::Echo;
 use crate::endpoint::Received;
+use crate::messages;
 use crate::wire::Priority;
 
 /// Identifies one query until it ends.
@@ -82,6 +95,59 @@ impl QueryOptions {
     }
 }
 
+/// A query, and what answers it.
+#[derive(Debug, Clone)]
+pub struct Question {
+    /// The query, from its message code.
+    query: Bytes,
+    /// The code of the report.
+    report: u16,
+    echoes: &'static [Echo],
+}
+
+impl Question {
+    /// A query with this report. What both have in common is looked up among the messages of this library.
+    #[must_use]
+    pub fn new(query: Bytes, report: u16) -> Self {
+        let code = code_of(&query).unwrap_or_default();
+        let known = messages::registry().by_code(code).next();
+        let echoes = known.map_or(&[][..], |it| it.echoes);
+        Self {
+            query,
+            report,
+            echoes,
+        }
+    }
+
+    /// The same for messages that the library does not have, with what they have in common.
+    #[must_use]
+    pub const fn echoing(mut self, echoes: &'static [Echo]) -> Self {
+        self.echoes = echoes;
+        self
+    }
+
+    /// The code of the query.
+    #[must_use]
+    pub fn code(&self) -> u16 {
+        code_of(&self.query).unwrap_or_default()
+    }
+
+    /// Whether nothing in a report with the code says that it answers another query.
+    fn agrees(&self, report: &[u8]) -> bool {
+        self.echoes.iter().all(|it| it.is_in(&self.query, report))
+    }
+
+    /// Whether a report may answer both this question and another.
+    fn is_like(&self, other: &Self) -> bool {
+        let mut echoes = self.echoes.iter();
+        self.echoes != other.echoes
+            || echoes.all(|it| {
+                let number = it.query..it.query + it.octets;
+                self.query.get(number.clone()) == other.query.get(number)
+            })
+    }
+}
+
 /// A query that timed out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoAnswer {
@@ -95,8 +161,8 @@ pub struct NoAnswer {
 
 /// The pending queries of one component.
 ///
-/// JAUS answers do not say which query they answer. So of several queries to the same peer for the
-/// same report only the oldest is sent; the next follows when that one has ended.
+/// Of several queries to the same peer for the same report only the oldest is sent; the next follows when
+/// that one has ended, and its answers have come that could be taken for those of the next.
 #[derive(Debug, Default)]
 pub(super) struct Inquiries {
     last: u64,
@@ -106,43 +172,63 @@ pub(super) struct Inquiries {
     /// The turns whose peer id has wildcards.
     open: BTreeSet<Turn>,
     due: BTreeSet<(Instant, Inquiry)>,
+    /// What may still come for queries that have ended, the oldest first.
+    owed: VecDeque<Owed>,
     failed: VecDeque<(Inquiry, NoAnswer)>,
 }
 
 /// The code of a report, and the peer that sends it.
 type Turn = (u16, JausId);
 
+/// Whether one message may answer queries of both turns.
+fn overlap(one: Turn, other: Turn) -> bool {
+    one.0 == other.0 && one.1.overlaps(other.1)
+}
+
 #[derive(Debug)]
 struct Waiting {
     turn: Turn,
-    query: Bytes,
+    question: Question,
     priority: Priority,
     patience: Patience,
     asked: Option<Asked>,
+}
+
+/// Answers that may still come for a query that has ended.
+#[derive(Debug)]
+struct Owed {
+    turn: Turn,
+    question: Question,
+    answers: u32,
+    /// How long the peer may take for the next one, and until when.
+    patience: Duration,
+    until: Instant,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     first: Instant,
     tries: u32,
+    latest: Instant,
     next: Instant,
 }
 
 impl Inquiries {
     /// The limit of pending queries; the next one fails at once.
     const MOST: usize = 4096;
+    /// The limit of ended queries whose answers are still awaited; of more, the oldest are forgotten.
+    const MOST_OWED: usize = 1024;
 
     pub(super) fn ask(
         &mut self,
         now: Instant,
         peer: JausId,
-        query: Bytes,
-        report: u16,
+        question: Question,
         options: QueryOptions,
         out: &mut Outbox,
     ) -> Inquiry {
         self.last += 1;
-        let (inquiry, turn) = (Inquiry(self.last), (report, peer));
+        let (inquiry, turn) = (Inquiry(self.last), (question.report, peer));
         if self.waiting.len() >= Self::MOST {
             let (tries, waited) = (0, Duration::ZERO);
             let failure = NoAnswer {
@@ -155,7 +241,7 @@ impl Inquiries {
         }
         let waiting = Waiting {
             turn,
-            query,
+            question,
             priority: options.priority,
             patience: options.patience.unwrap_or_default(),
             asked: None,
@@ -165,13 +251,13 @@ impl Inquiries {
         if peer.has_wildcard() {
             self.open.insert(turn);
         }
-        self.proceed(now, turn, out);
+        self.send_first(now, turn, out);
         inquiry
     }
 
     /// Cancels a query.
     pub(super) fn cancel(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
-        self.end(now, inquiry, out);
+        self.end(now, inquiry, 0, out);
     }
 
     /// The query that this message answers, if any.
@@ -181,16 +267,53 @@ impl Inquiries {
         message: &Received,
         out: &mut Outbox,
     ) -> Option<Inquiry> {
-        let code = code_of(&message.payload)?;
-        let all = (code, JausId::from_u32(0))..=(code, JausId::from_u32(u32::MAX));
-        let open = self.open.range(all);
-        let open = open.filter(|(_, peer)| peer.matches(message.source));
-        let own = (code, message.source);
-        let turns = open.chain([&own]);
-        let first = turns.filter_map(|turn| self.turns.get(turn)?.front());
-        let inquiry = first.min().copied()?;
-        self.end(now, inquiry, out);
-        Some(inquiry)
+        let turn = (code_of(&message.payload)?, message.source);
+        let asked = self.asked(turn);
+        let agrees = |it: &(Inquiry, &Question)| it.1.agrees(&message.payload);
+        let answered = asked.filter(agrees).map(|it| it.0).min();
+        match answered {
+            Some(inquiry) => self.end(now, inquiry, 1, out),
+            None => self.receive_owed(now, turn, &message.payload, out),
+        }
+        answered
+    }
+
+    /// Notes the answer to a query that has ended.
+    fn receive_owed(&mut self, now: Instant, turn: Turn, report: &[u8], out: &mut Outbox) {
+        let is_it = |it: &&mut Owed| overlap(it.turn, turn) && it.question.agrees(report);
+        if let Some(owed) = self.owed.iter_mut().find(is_it) {
+            owed.answers -= 1;
+            if !owed.turn.1.has_wildcard() {
+                // The peer is late, but does answer: so the others will come, too.
+                owed.until = now + owed.patience;
+            }
+            self.forget_owed(now, out);
+        }
+    }
+
+    /// The turns that overlap this one.
+    fn overlapping(&self, turn: Turn) -> Vec<Turn> {
+        let of_code = |peer| (turn.0, JausId::from_u32(peer));
+        let all = of_code(0)..=of_code(u32::MAX);
+        if turn.1.has_wildcard() {
+            let all = self.turns.range(all).map(|(turn, _)| *turn);
+            return all.filter(|it| overlap(*it, turn)).collect();
+        }
+        let open = self.open.range(all).copied();
+        let open = open.filter(|it| overlap(*it, turn));
+        let own = self.turns.contains_key(&turn).then_some(turn);
+        open.chain(own).collect()
+    }
+
+    /// The queries that were sent, and that a message of this turn may answer.
+    fn asked(&self, turn: Turn) -> impl Iterator<Item = (Inquiry, &Question)> {
+        let turns = self.overlapping(turn).into_iter();
+        turns.filter_map(|turn| {
+            let inquiry = self.turns.get(&turn)?.front()?;
+            let waiting = self.waiting.get(inquiry)?;
+            let question = &waiting.question;
+            waiting.asked.map(|_| (*inquiry, question))
+        })
     }
 
     /// The peers whose queries would be repeated now, or time out.
@@ -232,9 +355,10 @@ impl Inquiries {
             };
             if asked.tries < waiting.patience.tries {
                 asked.tries += 1;
+                asked.latest = now;
                 asked.next = now + waiting.patience.interval;
                 self.due.insert((asked.next, inquiry));
-                out.send_octets_with(peer, waiting.priority, waiting.query.clone());
+                out.send_octets_with(peer, waiting.priority, waiting.question.query.clone());
                 continue;
             }
             let failure = NoAnswer {
@@ -243,147 +367,118 @@ impl Inquiries {
                 waited: now.saturating_duration_since(asked.first),
             };
             self.failed.push_back((inquiry, failure));
-            self.end(now, inquiry, out);
+            self.end(now, inquiry, 0, out);
+        }
+        self.forget_owed(now, out);
+    }
+
+    /// Forgets the answers that have come or do not come any more, and sends the queries that waited
+    /// for them.
+    fn forget_owed(&mut self, now: Instant, out: &mut Outbox) {
+        let mut freed = Vec::new();
+        self.owed.retain(|it| {
+            let stays = it.answers > 0 && now < it.until;
+            if !stays {
+                freed.push(it.turn);
+            }
+            stays
+        });
+        for turn in freed {
+            self.proceed(now, turn, out);
         }
     }
 
+    /// The next query that has timed out.
     pub(super) fn poll_failure(&mut self) -> Option<(Inquiry, NoAnswer)> {
         self.failed.pop_front()
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
-        self.due.first().map(|&(due, _)| due)
+        let due = self.due.first().map(|&(due, _)| due);
+        let owed = self.owed.iter().map(|it| it.until);
+        due.into_iter().chain(owed).min()
     }
 
-    /// Ends a query, and sends the next one of its turn.
-    fn end(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
+    /// Ends a query that has got this many answers, and sends the next one of its turn.
+    fn end(&mut self, now: Instant, inquiry: Inquiry, answers: u32, out: &mut Outbox) {
         let Some(ended) = self.waiting.remove(&inquiry) else {
             return;
         };
-        if let Some(asked) = ended.asked {
-            self.due.remove(&(asked.next, inquiry));
-        }
-        if let Some(queue) = self.turns.get_mut(&ended.turn) {
+        let turn = ended.turn;
+        if let Some(queue) = self.turns.get_mut(&turn) {
             if queue.front() == Some(&inquiry) {
                 queue.pop_front();
             } else {
                 queue.retain(|other| *other != inquiry);
             }
             if queue.is_empty() {
-                self.turns.remove(&ended.turn);
-                self.open.remove(&ended.turn);
+                self.turns.remove(&turn);
+                self.open.remove(&turn);
             }
         }
-        self.proceed(now, ended.turn, out);
+        if let Some(asked) = ended.asked {
+            self.due.remove(&(asked.next, inquiry));
+            self.owe(now, ended, asked, answers);
+        }
+        self.proceed(now, turn, out);
     }
 
-    /// Sends the first query of a turn unless it was already sent.
+    /// Notes the answers that may still come for a query: one for each try, or from a group any number.
+    /// They come within the time that the peer has taken so far, or within the interval of its tries.
+    fn owe(&mut self, now: Instant, ended: Waiting, asked: Asked, answers: u32) {
+        let answers = match ended.turn.1.has_wildcard() {
+            true => u32::MAX,
+            false => asked.tries.saturating_sub(answers),
+        };
+        let taken = now.saturating_duration_since(asked.first);
+        let patience = taken.max(ended.patience.interval);
+        let until = asked.latest + patience;
+        if answers == 0 || until <= now {
+            return;
+        }
+        if self.owed.len() >= Self::MOST_OWED {
+            self.owed.pop_front();
+        }
+        self.owed.push_back(Owed {
+            turn: ended.turn,
+            question: ended.question,
+            answers,
+            patience,
+            until,
+        });
+    }
+
+    /// Sends the first query of this turn and of those that overlap it.
     fn proceed(&mut self, now: Instant, turn: Turn, out: &mut Outbox) {
+        for turn in self.overlapping(turn) {
+            self.send_first(now, turn, out);
+        }
+    }
+
+    /// Sends the first query of a turn, unless it was sent already, or its answer could be taken for that
+    /// to another query, or the other way round.
+    fn send_first(&mut self, now: Instant, turn: Turn, out: &mut Outbox) {
         let first = self.turns.get(&turn).and_then(VecDeque::front);
-        let Some((&inquiry, waiting)) = first.and_then(|it| Some((it, self.waiting.get_mut(it)?)))
+        let Some((&inquiry, waiting)) = first.and_then(|it| Some((it, self.waiting.get(it)?)))
         else {
             return;
         };
-        if waiting.asked.is_some() {
+        let owed = self.owed.iter().filter(|it| overlap(it.turn, turn));
+        let asked = self.asked(turn).map(|it| it.1);
+        let others: Vec<_> = asked.chain(owed.map(|it| &it.question)).collect();
+        if waiting.asked.is_some() || others.iter().any(|it| it.is_like(&waiting.question)) {
             return;
         }
-        let next = now + waiting.patience.interval;
-        waiting.asked = Some(Asked {
-            first: now,
-            tries: 1,
-            next,
-        });
-        self.due.insert((next, inquiry));
-        out.send_octets_with(turn.1, waiting.priority, waiting.query.clone());
-    }
-}
-
-#[cfg(test)]
-#[expect(
-    clippy::disallowed_methods,
-    reason = "virtual time starts at any instant"
-)]
-mod tests {
-    use super::*;
-
-    const US: JausId = JausId::new(101, 1, 1);
-    const PEER: JausId = JausId::new(102, 1, 1);
-
-    #[test]
-    fn a_question_too_many_fails_at_once_and_the_others_take_their_turns() {
-        let (mut inquiries, now) = (Inquiries::default(), Instant::now());
-        let mut out = Outbox::new(US);
-        let ask = |inquiries: &mut Inquiries, out: &mut Outbox| {
-            let options = QueryOptions::default();
-            inquiries.ask(now, PEER, Bytes::new(), 0x4202, options, out)
-        };
-        for _ in 0..Inquiries::MOST {
-            ask(&mut inquiries, &mut out);
-        }
-        assert!(inquiries.poll_failure().is_none());
-        let last = ask(&mut inquiries, &mut out);
-        let failed = inquiries.poll_failure().map(|(inquiry, _)| inquiry);
-        assert_eq!(failed, Some(last));
-        assert!(out.pop().is_some() && out.pop().is_none(), "one at a time");
-        inquiries.cancel(now, Inquiry(2), &mut out);
-        inquiries.cancel(now, Inquiry(1), &mut out);
-        assert!(out.pop().is_some() && out.pop().is_none(), "the third");
-        assert_eq!(inquiries.waiting.len(), Inquiries::MOST - 2);
-    }
-
-    #[test]
-    fn the_patience_of_a_query_holds_for_that_query_alone() {
-        let (mut inquiries, start) = (Inquiries::default(), Instant::now());
-        let mut out = Outbox::new(US);
-        let (usual, patient) = (QueryOptions::default(), QueryOptions::default());
-        let patient = patient.within(Duration::from_secs(5));
-        for (report, options) in [(0x4202, usual), (0x4203, patient), (0x4204, usual)] {
-            inquiries.ask(start, PEER, Bytes::new(), report, options, &mut out);
-        }
-        let mut ends = Vec::new();
-        while let Some(now) = inquiries.poll_timeout() {
-            inquiries.handle_timeout(now, &mut out);
-            while let Some((Inquiry(number), failure)) = inquiries.poll_failure() {
-                ends.push((number, failure.tries, failure.waited.as_millis()));
-            }
-        }
-        assert_eq!(ends, [(1, 3, 1500), (3, 3, 1500), (2, 10, 5000)]);
-    }
-
-    #[test]
-    fn a_query_is_not_repeated_while_parts_of_a_large_report_arrive() {
-        let (mut inquiries, start) = (Inquiries::default(), Instant::now());
-        let mut out = Outbox::new(US);
-        let options = QueryOptions::default()
-            .within(Duration::from_secs(1))
-            .priority(Priority::High);
-        inquiries.ask(start, PEER, Bytes::new(), 0x4202, options, &mut out);
-        assert_eq!(out.pop().map(|it| it.priority), Some(Priority::High));
-        let at = |milliseconds| start + Duration::from_millis(milliseconds);
-        // Parts arrive for 4 s.
-        for milliseconds in (100..=4000).step_by(100) {
-            let now = at(milliseconds);
-            for peer in inquiries.overdue(now).collect::<Vec<_>>() {
-                assert_eq!(peer, PEER);
-                inquiries.handle_progress(now, peer, at(milliseconds - 50));
-            }
-            inquiries.handle_timeout(now, &mut out);
-            assert!(out.pop().is_none(), "{milliseconds} ms");
-        }
-        // Then they stop.
-        for (milliseconds, is_sent, has_failed) in [
-            (4400, false, false),
-            (4500, true, false),
-            (5000, false, true),
-        ] {
-            inquiries.handle_progress(at(milliseconds), PEER, at(3950));
-            inquiries.handle_timeout(at(milliseconds), &mut out);
-            assert_eq!(out.pop().is_some(), is_sent, "{milliseconds} ms");
-            assert_eq!(
-                inquiries.poll_failure().is_some(),
-                has_failed,
-                "{milliseconds} ms"
-            );
+        if let Some(waiting) = self.waiting.get_mut(&inquiry) {
+            let next = now + waiting.patience.interval;
+            waiting.asked = Some(Asked {
+                first: now,
+                tries: 1,
+                latest: now,
+                next,
+            });
+            self.due.insert((next, inquiry));
+            out.send_octets_with(turn.1, waiting.priority, waiting.question.query.clone());
         }
     }
 }

@@ -436,6 +436,7 @@ mod tests {
             sequence: None,
             payload: Bytes::copy_from_slice(&code.to_le_bytes()),
             path: None,
+            acknowledged: false,
         }
     }
 

@@ -68,6 +68,8 @@ use crate::endpoint::Received;
 pub use crate::codec::{Date, Hazards};
 pub use audience::Audience;
 pub use call::{Call, LaterAnswer};
+#[cfg(feature = "node")]
+pub(crate) use client::OWN_REQUESTS;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, SubscriptionEnd,
@@ -85,7 +87,7 @@ pub use functions::Functions;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
 pub use incarnation::Incarnation;
-pub use inquiries::{Inquiry, NoAnswer, Patience, QueryOptions};
+pub use inquiries::{Inquiry, NoAnswer, Patience, QueryOptions, Question};
 pub use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
@@ -171,6 +173,13 @@ pub trait Service: Send {
     /// An offered version with a query that is neither answered nor declined, and the query's name.
     fn unanswered_query(&self) -> Option<(ServiceId, &'static str)> {
         None
+    }
+
+    /// Whether it answers the query with this code, so that clients can subscribe to the answers. Of the
+    /// queries that the library knows, no service needs to say so.
+    fn answers(&self, query: u16) -> bool {
+        let _ = query;
+        false
     }
 
     /// Whether this service reports the end of commands with this code, with [`Context::ended`]. If

@@ -333,6 +333,7 @@ mod tests {
             sequence,
             payload: message.encode().unwrap(),
             path: None,
+            acknowledged: false,
         }
     }
 

@@ -123,6 +123,7 @@ impl Rig {
             sequence,
             path: None,
             to: self.out.source(),
+            acknowledged: false,
         }
     }
 

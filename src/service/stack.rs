@@ -4,7 +4,6 @@ mod client;
 mod safeguard;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -22,16 +21,13 @@ use super::{
     NoAnswer, NotPublished, Outbox, Publication, Service, SessionId, SessionState, Standing,
     StopCause, SubscriptionId, SubscriptionNews, UnsafeService, code_of,
 };
-use safeguard::Faults;
+use safeguard::{Faults, is_query};
 
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{QueryAuthority, QueryControl, QueryStatus};
 use crate::wire::{Broadcast, Priority};
-
-/// The codes that AS5710 sets aside for queries.
-const QUERIES: RangeInclusive<u16> = 0x2000..=0x3FFF;
 
 /// A component without a network: its services, its directory, and its pending queries.
 pub struct Stack {
@@ -325,8 +321,9 @@ impl Stack {
     }
 
     fn handle_event_request(&mut self, now: Instant, message: &Received) -> Handled {
+        let services = &self.services;
         let events = &mut self.subscribers;
-        match events.handle_message(now, message, &mut self.out) {
+        match events.handle_message(now, message, |it| is_query(services, it), &mut self.out) {
             Outcome::NotOurs => return Handled::No,
             Outcome::Done => {}
             Outcome::TryCommand(trial) => self.carry_out(now, &trial),
@@ -371,14 +368,13 @@ impl Stack {
             payload: query.clone(),
             sequence: None,
             path: None,
+            acknowledged: false,
         };
         // Messages sent meanwhile are the answer and are not transmitted. A query changes nothing.
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
         let news = std::mem::take(&mut self.news);
         let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
-        // A client may put a command in place of the query: control does not obey it.
-        let is_query = code_of(query).is_some_and(|code| QUERIES.contains(&code));
-        let by_control = is_query && self.handle_control(now, &message) == Handled::Yes;
+        let by_control = self.handle_control(now, &message) == Handled::Yes;
         if discovered == Handled::No && !by_control {
             self.handle_by_services(now, &message);
         }

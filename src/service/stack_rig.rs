@@ -68,6 +68,7 @@ impl StackRig {
             payload: message.encode().unwrap(),
             sequence: self.number,
             path,
+            acknowledged: false,
         };
         self.number = self.number.map(|number| number.wrapping_add(1));
         self.stack.handle_message(self.now, &received);

@@ -20,6 +20,7 @@ type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 pub struct UndecodedFunctions {
     offers: Vec<ServiceId>,
     by_code: BTreeMap<u16, Function>,
+    queries: BTreeSet<u16>,
     declined: BTreeSet<u16>,
     stops: Vec<Stop>,
     hazards: Hazards,
@@ -76,6 +77,7 @@ impl Handlers<UndecodedFunctions> {
         query: u16,
         mut function: impl FnMut(&Received) -> Option<Bytes> + Send + 'static,
     ) -> Self {
+        self.provider.queries.insert(query);
         self.handle(query, move |call| {
             if let Some(received) = call.received()
                 && let Some(report) = function(received)
@@ -218,6 +220,10 @@ impl<'a> codec::Provider<Call<'a>> for UndecodedFunctions {
         unanswered_query(&self.offers, is_known)
     }
 
+    fn answers(&self, query: u16) -> bool {
+        self.queries.contains(&query)
+    }
+
     fn receive(&mut self, code: u16, call: &mut Call<'a>) -> Option<Result<(), DecodeError>> {
         self.by_code.get_mut(&code)?(call);
         Some(Ok(()))
@@ -240,7 +246,7 @@ pub(super) fn unanswered_query(
     let services = registry.services().filter(of_ours);
     let mut messages = services.flat_map(|info| info.inputs.iter().map(|&code| (info.id, code)));
     let (service, query) =
-        messages.find(|(_, code)| codec::report_code(*code).is_some() && !is_known(code))?;
+        messages.find(|(_, code)| registry.report_of(*code).is_some() && !is_known(code))?;
     Some((service, registry.in_service(service, query)?.name))
 }
 

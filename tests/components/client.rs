@@ -301,6 +301,38 @@ async fn control_tells_each_status_that_the_peer_reports_and_its_own_loss() {
     assert_eq!(control.status(), lost);
 }
 
+#[test]
+fn control_is_given_back_at_the_end_of_main() {
+    let group = own_group();
+    let (addressed, address) = std::sync::mpsc::channel();
+    let peer = std::thread::spawn(move || {
+        runtime().block_on(async {
+            let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
+            let mut peer = Puppet(node.attach(33).unwrap());
+            addressed.send(peer.id()).unwrap();
+            within_limit(peer.expect::<RequestControl>()).await;
+            peer.say(&ConfirmControl::default());
+            within_limit(peer.expect::<ReleaseControl>()).await;
+        });
+    });
+    let peer_id = address.recv().unwrap();
+    runtime().block_on(async {
+        let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
+        let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
+            .attach(&node, 1)
+            .unwrap();
+        let control = operator.control(peer_id, 127).await.unwrap();
+        // The last command precedes the release.
+        control.send(&Resume {}).unwrap();
+    });
+    peer.join().unwrap();
+}
+
+fn runtime() -> tokio::runtime::Runtime {
+    let mut runtime = tokio::runtime::Builder::new_current_thread();
+    runtime.enable_all().build().unwrap()
+}
+
 #[tokio::test]
 async fn control_is_given_back_when_it_is_dropped() {
     let mut scene = Scene::new();

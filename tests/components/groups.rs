@@ -156,7 +156,9 @@ async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not()
     let pulse = ReportHeartbeatPulse {};
     let told = within_limit(operator.deliver_all(Audience::EVERYBODY, &pulse)).await;
     assert!(told.is_complete() && told.len() == 2, "{told:?}");
-    let name = QueryIdentification::default();
+    let name = QueryIdentification {
+        query_type: 2.into(),
+    };
     let named = within_limit(operator.query_all(Audience::EVERYBODY, &name));
     assert_eq!(named.await.successes().count(), 2);
 
@@ -230,7 +232,7 @@ async fn a_member_that_takes_its_service_back_is_gone_and_one_that_refuses_is_to
     assert!(matches!(why, SubscriptionEnd::TooSlow { .. }), "{why}");
     assert!(peer == sensor.id() && again == Duration::from_secs(1));
 
-    sensor.withdraw(velocity_state_sensor::URN).await;
+    sensor.withdraw(velocity_state_sensor::URN).await.unwrap();
     while within_limit(speeds.next()).await != Some((id, GroupUpdate::Gone)) {}
 }
 

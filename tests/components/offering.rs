@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{
-    AttachError, Change, Component, FindError, Handlers, Kind, Level, Liveness, Patience,
-    QueryError, QueryOptions, SendError,
+    AttachError, Change, Component, Condition, FindError, Handlers, Kind, Level, Liveness,
+    OfferError, Patience, QueryError, QueryOptions, SendError, State, StopReason, Stopped,
 };
 use jaus::link::Group;
 use jaus::messages::core::{QueryHeartbeatPulse, QueryStatus, ReportStatus, liveness, management};
@@ -210,7 +210,7 @@ async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
         .await
         .unwrap();
     assert!(within_limit(ask()).await.is_ok());
-    rover.withdraw(id.urn).await;
+    rover.withdraw(id.urn).await.unwrap();
     assert!(within_limit(ask()).await.is_err());
 }
 
@@ -267,12 +267,32 @@ async fn a_component_notices_that_its_node_has_stopped() {
     let mut watch = rover.watch();
     within_limit(node.shutdown()).await;
     assert_eq!(within_limit(watch.next()).await, None);
+    assert_eq!(within_limit(rover.stopped()).await, StopReason::Ended);
+    assert_eq!(rover.standing().state, State::Shutdown);
     let asked = rover.query(JausId::new(1, 1, 1), &QueryStatus {});
     assert_eq!(within_limit(asked).await, Err(QueryError::Stopped));
     assert_eq!(
         rover.find("urn:test:Nothing").await,
         Err(FindError::Stopped)
     );
+}
+
+#[tokio::test]
+async fn a_component_whose_service_has_panicked_does_not_look_alive() {
+    let (rover, operator) = rover_and_operator();
+    let broken = Handlers::new(management::LATEST)
+        .answer(|_: QueryStatus| -> ReportStatus { panic!("a fault of this service") });
+    rover.offer(broken).await.unwrap();
+    assert_eq!(rover.standing().state, State::Ready);
+    operator.send(rover.id(), &QueryStatus {}).unwrap();
+    assert_eq!(within_limit(rover.stopped()).await, StopReason::Panicked);
+    assert_eq!(rover.standing().state, State::Failure);
+    let condition = rover.set_condition(Condition::Initialized).await;
+    assert_eq!(condition, Err(Stopped));
+    assert_eq!(rover.changed::<QueryStatus>().await, Err(Stopped));
+    assert_eq!(rover.withdraw(management::URN).await, Err(Stopped));
+    let offered = rover.offer(Handlers::new(management::LATEST)).await;
+    assert_eq!(offered, Err(OfferError::Stopped(Stopped)));
 }
 
 #[tokio::test]

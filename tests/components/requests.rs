@@ -88,7 +88,7 @@ async fn the_client_learns_how_a_command_ends() {
     let drive = within_limit(client.run(rover.id(), &effort, LIMIT))
         .await
         .unwrap();
-    rover.ended::<SetWrenchEffort>(true).await;
+    rover.ended::<SetWrenchEffort>(true).await.unwrap();
     within_limit(drive.end()).await.unwrap();
 
     let drive = within_limit(client.run(rover.id(), &effort, LIMIT))

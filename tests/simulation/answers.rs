@@ -9,7 +9,8 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Config, Endpoint};
 use jaus::service::{
-    Discovery, Event, Handlers, Kind, NoAnswer, Profile, QueryOptions, Scope, Stack, Timing,
+    Discovery, Event, Handlers, Kind, NoAnswer, Profile, QueryOptions, Question, Scope, Stack,
+    Timing,
 };
 use jaus_vehicle::messages::ground::{QueryRasterCells, ReportRasterCells, raster_maps};
 
@@ -116,7 +117,9 @@ fn ask(knows_progress: bool) -> (Option<Result<Bytes, NoAnswer>>, u32) {
     network.act(client, |now, component, endpoint| {
         let query = QueryRasterCells::default().encode().expect("a query");
         let (report, options) = (ReportRasterCells::CODE, QueryOptions::default());
-        component.stack.ask(now, SERVER, query, report, options);
+        component
+            .stack
+            .ask(now, SERVER, Question::new(query, report), options);
         component.settle(now, endpoint);
     });
     network.run_for(Duration::from_secs(10));

@@ -172,6 +172,10 @@ impl<E: Notice> Service for Attended<E> {
         self.inner.unanswered_query()
     }
 
+    fn answers(&self, query: u16) -> bool {
+        self.inner.answers(query)
+    }
+
     fn poll_timeout(&self) -> Option<Instant> {
         let next_look = self.looked.map(|looked| looked + Self::BEAT);
         let look = match self.hung {

@@ -4,11 +4,11 @@ use std::ffi::c_char;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::report_code;
 use jaus::component::{
     Component, ControlError, DeliverError, FindError, ManageError, QueryError, QueryOptions,
     SendError,
 };
+use jaus::messages::registry;
 
 use crate::argument::{check_out, code_of, limit, message, one_component, priority, put, text};
 use crate::component::running;
@@ -74,7 +74,7 @@ async fn ask(
 pub(crate) fn report_of(query: &Bytes, given: u16) -> Result<u16, Failure> {
     let code = code_of(query);
     match given {
-        0 => report_code(code).ok_or_else(|| {
+        0 => registry().report_of(code).ok_or_else(|| {
             Failure::argument(format!(
                 "{code:04X}h is not the code of a query: give the code of its report"
             ))

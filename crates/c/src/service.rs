@@ -3,9 +3,9 @@
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-use jaus::codec::report_code;
 use jaus::component::{Handlers, UndecodedFunctions, Validity};
 use jaus::endpoint::Received;
+use jaus::messages::registry;
 use jaus_binding::{ServiceKey, service_id};
 
 use crate::argument::{check_out, message, put, text};
@@ -165,7 +165,7 @@ pub unsafe extern "C" fn jaus_answer_set(
 #[unsafe(no_mangle)]
 pub extern "C" fn jaus_service_publish(service: JausService, query: u16) -> JausStatus {
     run(|| {
-        let Some(report) = report_code(query) else {
+        let Some(report) = registry().report_of(query) else {
             return Err(Failure::argument(format!(
                 "{query:04X}h is not the code of a query"
             )));

@@ -62,7 +62,7 @@ pub use message::View;
 pub use message::{AnyMessage, Message, ServiceId};
 #[doc(hidden)]
 pub use query::keep_if;
-pub use query::{Query, Report, query_code, report_code};
+pub use query::{Echo, Query, Report, query_code, report_code};
 pub use reader::Reader;
 #[doc(hidden)]
 pub use registry::RandomMessage;

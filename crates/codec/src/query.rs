@@ -4,15 +4,46 @@ use core::time::Duration;
 
 use super::message::Message;
 
-/// A query, which its report answers. Generated for each message `QueryX` whose service declares a
-/// `ReportX` with the code of [`report_code`].
+/// A query, which its report answers. Generated for each message for which the definition of its service has
+/// a report: by what the state machine sends, by the names, or by [`report_code`].
 pub trait Query: Message {
     /// The report. Of several layouts the newest that a service declares beside the query.
     type Report: Report;
+    /// The numbers that both have in common.
+    const ECHOES: &'static [Echo] = &[];
 
     /// Removes the optional fields of a report that the query's presence vector does not request.
     /// Without effect if the query has no presence vector for the report's own fields.
     fn drop_unrequested(&self, _report: &mut Self::Report) {}
+}
+
+/// A number that a query and its report have in common, such as the number of the list element that is asked
+/// for: a report with another value answers another query. Places are in octets from the beginning of each
+/// message, with its code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Echo {
+    /// The place in the query.
+    pub query: usize,
+    /// The place in the report.
+    pub report: usize,
+    /// The length.
+    pub octets: usize,
+}
+
+impl Echo {
+    /// Whether a report may answer a query: it says nothing else.
+    #[must_use]
+    pub fn is_in(self, query: &[u8], report: &[u8]) -> bool {
+        let number = |place: usize| place..place.saturating_add(self.octets);
+        match (
+            query.get(number(self.query)),
+            report.get(number(self.report)),
+        ) {
+            (Some(asked), Some(told)) => asked == told,
+            // It is malformed, which its reader notices.
+            _ => true,
+        }
+    }
 }
 
 /// A report, which answers a query. Generated for each message that is the [`Query::Report`] of one.
@@ -29,7 +60,8 @@ pub trait Report: Message {
     }
 }
 
-/// The code of the report that answers a query; `None` if the code is not a query.
+/// The code of the report that answers a query, by the standard's arithmetic; `None` if the code is not a
+/// query. A definition knows better: [`Registry::report_of`](super::Registry::report_of).
 ///
 /// Queries are 2000h to 3FFFh and their reports 2000h higher (AS5710). In the experimental range,
 /// IOP services and this stack's own use queries from E000h and reports 1000h higher.

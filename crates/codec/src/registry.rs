@@ -7,6 +7,7 @@ use bytes::Bytes;
 
 use super::error::DecodeError;
 use super::message::{AnyMessage, Message, ServiceId};
+use super::query::{Echo, Query, report_code};
 
 /// Definition of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +36,10 @@ pub struct MessageInfo {
     pub is_command: bool,
     /// The services that declare exactly this layout, newest version first.
     pub services: &'static [ServiceId],
+    /// The code of the report that answers it, if it is a query.
+    pub report: Option<u16>,
+    /// [`Query::ECHOES`](super::Query::ECHOES), if it is a query.
+    pub echoes: &'static [Echo],
     /// [`Message::decode`]
     pub decode: fn(&Bytes) -> Result<Box<dyn AnyMessage>, DecodeError>,
     /// Creates the message from its human-readable view.
@@ -46,6 +51,17 @@ pub struct MessageInfo {
 }
 
 impl MessageInfo {
+    /// The entry for a query.
+    #[doc(hidden)]
+    #[must_use]
+    pub const fn of_query<Q: Query + RandomMessage>(services: &'static [ServiceId]) -> Self {
+        Self {
+            report: Some(<Q::Report as Message>::CODE),
+            echoes: Q::ECHOES,
+            ..Self::of::<Q>(services)
+        }
+    }
+
     /// Creates the entry for a message type.
     #[doc(hidden)]
     pub const fn of<M: Message + RandomMessage>(services: &'static [ServiceId]) -> Self {
@@ -54,6 +70,8 @@ impl MessageInfo {
             name: M::NAME,
             is_command: M::IS_COMMAND,
             services,
+            report: None,
+            echoes: &[],
             decode: |octets| Ok(Box::new(M::decode(octets)?)),
             #[cfg(feature = "serde")]
             from_view: |value| Ok(Box::new(M::from_view(value)?)),
@@ -159,6 +177,16 @@ impl Registry {
                 .iter()
                 .take_while(move |info| info.code == code)
         })
+    }
+
+    /// The code of the report that answers a query: as a definition says, or else by the standard's
+    /// [arithmetic](report_code). `None` if the code is not a query.
+    pub fn report_of(&self, query: u16) -> Option<u16> {
+        let mut known = self.by_code(query).peekable();
+        match known.peek() {
+            Some(_) => known.find_map(|it| it.report),
+            None => report_code(query),
+        }
     }
 
     /// The types with this name in their definition, newest first.

@@ -31,6 +31,13 @@ pub trait Provider<C> {
         None
     }
 
+    /// Whether it answers the query with this code, so that clients can subscribe to the answers. Of the
+    /// queries that the library knows, none needs to say so.
+    fn answers(&self, query: u16) -> bool {
+        let _ = query;
+        false
+    }
+
     /// Handles the message of the call. `None` if the service has no message with this code.
     fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), DecodeError>>;
 

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use bytes::Bytes;
-use jaus::codec::report_code;
+use jaus::messages;
 use jsidl::model::Service;
 use jsidl::presence;
 use serde_json::{Map, Value as Json};
@@ -80,20 +80,27 @@ impl Dictionary {
         Ok(fields.map(|(name, _)| name).collect())
     }
 
-    /// The report that answers a query: the one with the same name that a service of the query
-    /// defines, else the one with the code that the standard assigns.
+    /// The report that answers a query, as a service of the query defines it.
     fn report_of(&self, query: &Definition) -> Option<&Definition> {
         let shares_service =
             |it: &&Definition| it.services.iter().any(|it| query.services.contains(it));
-        if let Some(code) = report_code(query.code()) {
-            let mut known = self.candidates(code);
-            return known
-                .find(shares_service)
-                .or_else(|| self.candidates(code).next());
-        }
-        let name = format!("Report{}", query.name().strip_prefix("Query")?);
-        let mut known = self.definitions().filter(shares_service);
-        known.find(|it| it.name() == name)
+        let code = self.report_code(query)?;
+        let mut known = self.candidates(code);
+        known
+            .find(shares_service)
+            .or_else(|| self.candidates(code).next())
+    }
+
+    fn report_code(&self, query: &Definition) -> Option<u16> {
+        let library = self.library();
+        let services = query.services.iter().filter_map(|id| library.service(id));
+        let mut reports = services.filter_map(|service| {
+            let mut inputs = service.inputs.iter();
+            let declared = inputs.find(|it| it.code == query.code() && it.name == query.name())?;
+            service.report_of(declared)
+        });
+        let defined = reports.next().map(|it| it.code);
+        defined.or_else(|| messages::registry().report_of(query.code()))
     }
 
     /// The services that receive a message, if a component that offers these services has none of
@@ -248,6 +255,20 @@ mod tests {
             assert!(found.is_empty(), "{offered}: {found:?}");
         }
         assert!(missing(&[&discovery], 0xD3FF).is_empty());
+    }
+
+    #[test]
+    fn the_definition_knows_the_report_of_a_query() {
+        let dictionary = Dictionary::new().with_catalogue();
+        for (query, report) in [
+            ("QueryPlatformMode", 0xFF23),
+            ("QuerySupportedPlatformModes", 0xFF24),
+            ("QueryVelocityState", 0x4404),
+        ] {
+            let request = Request::new(query, serde_json::json!({}));
+            let encoded = dictionary.query(&request, &[]).unwrap();
+            assert_eq!(encoded.report, report, "{query}");
+        }
     }
 
     #[test]

@@ -10,7 +10,6 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::codec::report_code;
 use jaus::component::{Component, Undecoded, Update};
 use jaus::node::{now, sleep_until, units};
 use jaus::service::{QueryOptions, Topic, When};
@@ -258,9 +257,7 @@ static DICTIONARY: LazyLock<Dictionary> =
 /// The query that a report answers, with all fields of the report requested.
 fn encode(report: u16) -> Result<EncodedQuery, String> {
     let registry = messages::registry();
-    let mut queries = registry
-        .iter()
-        .filter(|it| report_code(it.code) == Some(report));
+    let mut queries = registry.iter().filter(|it| it.report == Some(report));
     let Some(query) = queries.next() else {
         return Err(format!("no query is known whose report is {report:04X}h"));
     };

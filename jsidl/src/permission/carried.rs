@@ -12,7 +12,7 @@
 //! | `v1(…;…)` | a tag of 1 octet, and the alternative with that number |
 //! | `x` | something that this notation cannot express |
 
-use super::fixed_size;
+use crate::heads::fixed_size;
 use crate::model::{Group, Item, Message, Shape, is_message_format};
 
 /// The layout of a message that carries others, after its code; `None` if it carries none.

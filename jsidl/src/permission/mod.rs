@@ -46,8 +46,9 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use crate::behaviour::{StateMachine, Transition, TransitionKind};
+use crate::heads::place_of;
 use crate::library::Library;
-use crate::model::{GroupKind, Item, Message, Number, Service, Shape, Unsigned};
+use crate::model::{Message, Service};
 
 /// What the sender of a message must be allowed to do.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -285,49 +286,4 @@ fn is_query(service: &Service, message: &Message) -> bool {
 /// Whether a node finds the destinations of the messages that this message carries.
 pub(crate) fn has_destinations(message: &Message) -> bool {
     carried::has_destinations(message)
-}
-
-/// The place of a field of one octet, which stands after fields of fixed sizes at the head of the body,
-/// in octets from the beginning of the message.
-pub(crate) fn place_of(message: &Message, field: &str) -> Option<usize> {
-    let body = message.body.as_ref().filter(|_| message.header.is_none())?;
-    let mut place = size_of::<u16>();
-    let members = fixed_members(body)?;
-    for member in members {
-        if member.name == field {
-            let is_octet = matches!(&member.shape, Shape::Scalar(it) if it.number == Number::Unsigned(Unsigned::U8));
-            return is_octet.then_some(place);
-        }
-        place += fixed_size(&member.shape)?;
-    }
-    None
-}
-
-/// The members of a record without a presence vector.
-fn fixed_members(item: &Item) -> Option<&[Item]> {
-    match &item.shape {
-        Shape::Group(group) if group.presence.is_none() && group.kind == GroupKind::Record => {
-            Some(&group.members)
-        }
-        _ => None,
-    }
-}
-
-/// Octets on the wire; `None` if they vary.
-fn fixed_size(shape: &Shape) -> Option<usize> {
-    match shape {
-        Shape::Scalar(scalar) => Some(scalar.number.size()),
-        Shape::Bits(bits) => Some(bits.base.size()),
-        Shape::FixedString { length } => usize::try_from(*length).ok(),
-        Shape::Group(group) if group.presence.is_none() => {
-            group.members.iter().map(|it| fixed_size(&it.shape)).sum()
-        }
-        Shape::Array(array) => {
-            let elements = array.dimensions.iter().try_fold(1_usize, |all, &it| {
-                all.checked_mul(usize::try_from(it).ok()?)
-            })?;
-            fixed_size(&array.element.shape)?.checked_mul(elements)
-        }
-        _ => None,
-    }
 }

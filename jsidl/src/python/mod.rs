@@ -81,33 +81,23 @@ pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(Strin
         .collect()
 }
 
-/// The report of a query: `ReportX` of `QueryX`, declared by a service that declares the query. Of
-/// several layouts that of the newest version which declares both.
+/// The report of a query, declared by a service that declares the query. Of several layouts that of the
+/// newest version which declares both.
 fn report<'p, 'm>(query: &Plan<'m>, set: &'p Set<'m>) -> Option<&'p Plan<'m>> {
-    let stem = query.message.name.strip_prefix("Query")?;
+    let report = query.report?;
     let shared = |plan: &Plan<'m>| {
         let services = plan.services.iter();
         let services = services.filter(|service| query.services.contains(service));
         services.map(|service| service.version).max()
     };
-    let answers = set.messages.iter().filter(|plan| {
-        let code = report_code(query.message.code);
-        plan.message.name.strip_prefix("Report") == Some(stem)
-            && code.is_none_or(|code| plan.message.code == code)
-    });
+    let answers = set
+        .messages
+        .iter()
+        .filter(|plan| plan.message.name == report);
     let dated = answers.filter_map(|plan| Some((shared(plan)?, plan)));
     dated
         .max_by_key(|(version, _)| *version)
         .map(|(_, plan)| plan)
-}
-
-/// The code of a query's report. Services outside of the standard use other codes, too.
-const fn report_code(query: u16) -> Option<u16> {
-    match query {
-        0x2000..=0x3FFF => Some(query + 0x2000),
-        0xE000..=0xEFFF => Some(query + 0x1000),
-        _ => None,
-    }
 }
 
 /// The number that requests every field of the report in a presence vector of its query; `None` if

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::item::{measure, text};
 use super::{Resolved, Resolver, Whole};
 use crate::check;
+use crate::heads;
 use crate::model::{Item, Message};
 use crate::permission::{self, Permission};
 use crate::source::{Span, Spanned};
@@ -47,7 +48,7 @@ impl Resolver<'_> {
         let Some(field) = message.permission.as_ref().and_then(Permission::field) else {
             return true;
         };
-        let is_found = permission::place_of(message, field).is_some();
+        let is_found = heads::place_of(message, field).is_some();
         if !is_found {
             let text = format!(
                 "a node cannot find the field `{field}`: name an `unsigned byte` in the body, a record \

@@ -27,6 +27,8 @@ pub(super) struct Plan<'m> {
     pub(super) later: Vec<(Version, [String; 2])>,
     /// The declaring services, the newest version first.
     pub(super) services: Vec<&'m Id>,
+    /// The name of the report that answers it, if it is a query.
+    pub(super) report: Option<&'m str>,
     /// Whether the command requires control.
     pub(super) needs_control: bool,
     /// Whether the command requires a component that is ready.
@@ -89,6 +91,8 @@ pub(super) fn plan<'m>(
             let layouts = messages.entry((message.code, &message.name)).or_default();
             let needs = |base| message.is_command && inherits(library, service, base);
             let layout = declare(layouts, message, &service.id);
+            let report = service.report_of(message).map(|it| it.name.as_str());
+            layout.report = report.or(layout.report);
             layout.needs_control |= needs(ACCESS_CONTROL);
             layout.needs_readiness |= needs(MANAGEMENT);
         }
@@ -123,6 +127,7 @@ struct Declared<'m> {
     /// The newest declaration.
     message: &'m Message,
     services: Vec<&'m Id>,
+    report: Option<&'m str>,
     needs_control: bool,
     needs_readiness: bool,
     is_deprecated: bool,
@@ -151,6 +156,7 @@ impl<'m> Declared<'m> {
             root,
             later,
             services: self.services,
+            report: self.report,
             needs_control: self.needs_control,
             needs_readiness: self.needs_readiness,
             is_deprecated: self.is_deprecated,
@@ -183,6 +189,7 @@ fn declare<'l, 'm>(
             layout,
             message,
             services: Vec::new(),
+            report: None,
             needs_control: false,
             needs_readiness: false,
             is_deprecated: true,

@@ -10,6 +10,7 @@ use super::structs::method_names;
 use super::types::{Field, Kind, Type, shared_key};
 use super::writer::Writer;
 use crate::fingerprint;
+use crate::heads::{Echo, echoes};
 use crate::model::Item;
 
 /// Implements `Query` if the message is a query with a report in the set. `shared` has the types
@@ -35,17 +36,20 @@ pub(super) fn implement(
         .as_ref()
         .and_then(|(query, report)| Request::of(query, report));
     out.gap();
-    let has_vectors = request.as_ref().is_some_and(Request::drops);
-    if !has_vectors {
-        out.push(format!(
-            "impl codec::Query for {} {{ type Report = {path}; }}",
-            query.ident
-        ));
-    }
-    if let Some(request) = request.as_ref().filter(|_| has_vectors) {
-        out.push(format!("impl codec::Query for {} {{", query.ident));
-        out.push(format!("type Report = {path};"));
-        request.drop_unrequested(out, &path, &format!("{types}::"));
+    let dropping = request.as_ref().filter(|it| it.drops());
+    let echoes = echoes(query.message, report.message);
+    let head = format!(
+        "impl codec::Query for {} {{ type Report = {path};",
+        query.ident
+    );
+    if dropping.is_none() && echoes.is_empty() {
+        out.push(format!("{head} }}"));
+    } else {
+        out.push(head);
+        write_echoes(out, &echoes);
+        if let Some(request) = dropping {
+            request.drop_unrequested(out, &path, &format!("{types}::"));
+        }
         out.push("}");
     }
     match request {
@@ -68,17 +72,27 @@ pub(super) fn implement(
     }
 }
 
-/// The report of a query: `ReportX` of `QueryX`, declared by a service that declares the query.
-/// Of several layouts the newest, which comes first.
+fn write_echoes(out: &mut Writer, echoes: &[Echo]) {
+    if echoes.is_empty() {
+        return;
+    }
+    let echoes = echoes.iter().map(|it| {
+        format!(
+            "codec::Echo {{ query: {}, report: {}, octets: {} }}",
+            it.query, it.report, it.octets
+        )
+    });
+    let echoes: Vec<_> = echoes.collect();
+    out.list("const ECHOES: &'static [codec::Echo] = &[", &echoes, "];");
+}
+
+/// The report of a query, declared by a service that declares the query. Of several layouts the newest,
+/// which comes first.
 pub(super) fn report<'p, 'm>(query: &Plan<'m>, plans: &'p [Plan<'m>]) -> Option<&'p Plan<'m>> {
-    let stem = query.message.name.strip_prefix("Query")?;
-    let code = report_code(query.message.code);
+    let report = query.report?;
     plans.iter().find(|plan| {
-        let name = plan.message.name.strip_prefix("Report");
         let mut services = plan.services.iter();
-        name == Some(stem)
-            && code.is_none_or(|code| plan.message.code == code)
-            && services.any(|service| query.services.contains(service))
+        plan.message.name == report && services.any(|service| query.services.contains(service))
     })
 }
 
@@ -87,15 +101,6 @@ pub(super) fn query_of<'p, 'm>(report: &Plan<'m>, plans: &'p [Plan<'m>]) -> Opti
     let answers =
         |query: &&Plan<'m>| self::report(query, plans).is_some_and(|it| it.path() == report.path());
     plans.iter().find(answers)
-}
-
-/// As `jaus_codec::report_code`. Services outside of the standard use other codes, too.
-const fn report_code(query: u16) -> Option<u16> {
-    match query {
-        0x2000..=0x3FFF => Some(query + 0x2000),
-        0xE000..=0xEFFF => Some(query + 0x1000),
-        _ => None,
-    }
 }
 
 /// The presence vectors of a query.

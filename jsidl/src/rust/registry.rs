@@ -7,6 +7,7 @@ use super::docs;
 use super::ident::{Names, version_constant};
 use super::machine::{self, Messages};
 use super::plan::Plan;
+use super::queries;
 use super::services::service;
 use super::writer::Writer;
 use crate::model::{Id, Message, Service};
@@ -119,7 +120,11 @@ pub(super) fn tables(
             .iter()
             .map(|id| service_id(id, paths))
             .collect();
-        let open = format!("codec::MessageInfo::of::<{}>(&[", plan.path());
+        let kind = match queries::report(plan, plans) {
+            Some(_) => "of_query",
+            None => "of",
+        };
+        let open = format!("codec::MessageInfo::{kind}::<{}>(&[", plan.path());
         out.list(&open, &services, "]),");
     }
     out.push("];");

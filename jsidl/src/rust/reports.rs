@@ -10,10 +10,7 @@ use crate::model::Shape;
 
 /// Implements `Report` if the message is the report of a query in the set.
 pub(super) fn implement(out: &mut Writer, plan: &Plan<'_>, plans: &[Plan<'_>]) {
-    let Some(stem) = plan.message.name.strip_prefix("Report") else {
-        return;
-    };
-    let of_this_name = |query: &&Plan<'_>| query.message.name.strip_prefix("Query") == Some(stem);
+    let of_this_name = |query: &&Plan<'_>| query.report == Some(&plan.message.name);
     let mut queries = plans.iter().filter(of_this_name);
     if !queries.any(|query| report(query, plans).is_some_and(|it| std::ptr::eq(it, plan))) {
         return;

@@ -161,6 +161,7 @@ impl<'a> Generator<'a> {
             "fn offers(&self) -> codec::List<codec::ServiceId> {{\ncodec::List::from([{offers}])\n}}"
         ));
         self.hazards(out);
+        self.answers(out);
         out.gap();
         self.receive(out);
         if self.guarded(|plan| plan.needs_readiness).is_some() {
@@ -171,6 +172,19 @@ impl<'a> Generator<'a> {
             connection.events(out);
         }
         out.push("}");
+    }
+
+    fn answers(&self, out: &mut Writer) {
+        let inputs = self.service.inputs.iter();
+        let queries = inputs.filter(|it| self.service.report_of(it).is_some());
+        let codes: Vec<_> = queries.map(|it| format!("0x{:04X}", it.code)).collect();
+        if !codes.is_empty() {
+            out.gap();
+            out.push(format!(
+                "fn answers(&self, query: u16) -> bool {{ [{}].contains(&query) }}",
+                codes.join(", ")
+            ));
+        }
     }
 
     fn hazards(&self, out: &mut Writer) {

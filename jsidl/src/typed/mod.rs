@@ -45,6 +45,8 @@ pub(crate) struct Plan<'m> {
     pub(crate) newest: Option<String>,
     /// The declaring services.
     pub(crate) services: Vec<&'m Id>,
+    /// The name of the report that answers it, if it is a query.
+    pub(crate) report: Option<&'m str>,
     /// The content after the message code.
     pub(crate) content: Content<'m>,
     /// Nested types; each one uses only those before it.
@@ -136,22 +138,22 @@ pub(crate) fn sets<'m>(
 /// One layout of a message with its declaring services.
 struct Layout<'m> {
     fingerprint: String,
-    services: Vec<(&'m Id, &'m Message)>,
+    services: Vec<(&'m Service, &'m Message)>,
 }
 
 impl<'m> Layout<'m> {
     /// Sorted, without duplicates.
     fn versions(&self) -> Vec<Version> {
-        let versions = self.services.iter().map(|(id, _)| id.version);
+        let versions = self.services.iter().map(|(it, _)| it.id.version);
         let mut versions: Vec<_> = versions.collect();
         versions.sort_unstable();
         versions.dedup();
         versions
     }
 
-    fn newest(&self) -> Option<(&'m Id, &'m Message)> {
+    fn newest(&self) -> Option<(&'m Service, &'m Message)> {
         let services = self.services.iter().copied();
-        services.max_by_key(|(id, _)| id.version)
+        services.max_by_key(|(it, _)| it.id.version)
     }
 }
 
@@ -162,10 +164,10 @@ fn layouts<'m>(services: &[&'m Service]) -> BTreeMap<(u16, &'m str), Vec<Layout<
         for message in service.messages() {
             let layouts = messages.entry((message.code, &message.name)).or_default();
             let fingerprint = fingerprint::layout(message);
-            let declared = (&service.id, message.as_ref());
+            let declared = (*service, message.as_ref());
             match layouts.iter_mut().find(|it| it.fingerprint == fingerprint) {
                 // A message in both sets of a service comes twice.
-                Some(known) if known.services.iter().any(|(id, _)| **id == service.id) => {}
+                Some(known) if known.services.iter().any(|(it, _)| it.id == service.id) => {}
                 Some(known) => known.services.push(declared),
                 None => layouts.push(Layout {
                     fingerprint,
@@ -183,10 +185,10 @@ fn plans<'m>(services: &[&'m Service], spelling: &'static Spelling) -> Vec<Plan<
     let mut plans = Vec::new();
     for ((_, name), mut layouts) in layouts(services) {
         let ident = root.type_name(name);
-        layouts.sort_by_key(|layout| layout.newest().map(|(id, _)| id.version));
+        layouts.sort_by_key(|layout| layout.newest().map(|(it, _)| it.id.version));
         let last = layouts.len().saturating_sub(1);
         for (age, layout) in layouts.iter().enumerate() {
-            let Some((_, message)) = layout.newest() else {
+            let Some((service, message)) = layout.newest() else {
                 continue;
             };
             let place = |version| {
@@ -201,7 +203,8 @@ fn plans<'m>(services: &[&'m Service], spelling: &'static Spelling) -> Vec<Plan<
                 message,
                 places,
                 newest: (age == last).then(|| ident.clone()),
-                services: layout.services.iter().map(|(id, _)| *id).collect(),
+                services: layout.services.iter().map(|(it, _)| &it.id).collect(),
+                report: service.report_of(message).map(|it| it.name.as_str()),
                 content,
                 types: nested.definitions,
             });

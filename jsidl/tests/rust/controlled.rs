@@ -280,6 +280,8 @@ pub mod siren {
             }
         }
 
+        fn answers(&self, query: u16) -> bool { [0xE011].contains(&query) }
+
         fn receive(&mut self, code: u16, call: &mut C) -> Option<Result<(), codec::DecodeError>> {
             let machine = self.machine.as_mut()?;
             let service = &mut self.service;
@@ -329,7 +331,7 @@ pub static SERVICES: &[codec::ServiceInfo] = &[
 /// The message types of the set, by code; of several with one code the newest first.
 pub static MESSAGES: &[codec::MessageInfo] = &[
     codec::MessageInfo::of::<SoundSiren>(&[siren::V1_0]),
-    codec::MessageInfo::of::<QuerySiren>(&[siren::V1_0]),
+    codec::MessageInfo::of_query::<QuerySiren>(&[siren::V1_0]),
     codec::MessageInfo::of::<ReportSiren>(&[siren::V1_0]),
 ];
 

@@ -34,11 +34,11 @@ pub mod versions {
         /// Handles `ReportMode`.
         fn report_mode(&mut self, message: super::ReportMode, call: &mut C);
 
-        /// Answers `QueryState`; `None` is for no answer, or a later one.
-        fn query_state(&mut self, query: super::QueryState, call: &mut C) -> Option<super::ReportState>;
+        /// Handles `QueryState`.
+        fn query_state(&mut self, message: super::QueryState, call: &mut C);
 
-        /// Answers `QueryMode`; `None` is for no answer, or a later one.
-        fn query_mode(&mut self, query: super::QueryMode, call: &mut C) -> Option<super::ReportMode>;
+        /// Handles `QueryMode`.
+        fn query_mode(&mut self, message: super::QueryMode, call: &mut C);
     }
 
     /// Passes messages to a [`Service`].
@@ -64,8 +64,8 @@ pub mod versions {
             Some(match code {
                 0xF081 => call.receive(|message: super::ReportState, call| self.service.report_state(message, call)),
                 0xF082 => call.receive(|message: super::ReportMode, call| self.service.report_mode(message, call)),
-                0xE081 => call.answer(|query: super::QueryState, call| self.service.query_state(query, call)),
-                0xE082 => call.answer(|query: super::QueryMode, call| self.service.query_mode(query, call)),
+                0xE081 => call.receive(|message: super::QueryState, call| self.service.query_state(message, call)),
+                0xE082 => call.receive(|message: super::QueryMode, call| self.service.query_mode(message, call)),
                 _ => return None,
             })
         }
@@ -125,8 +125,6 @@ pub mod v1_0 {
 
     codec::members!(QueryState {});
 
-    impl codec::Query for QueryState { type Report = ReportState; }
-
     /// `QueryMode` (E082h).
     ///
     /// Asks for the mode.
@@ -152,8 +150,6 @@ pub mod v1_0 {
     }
 
     codec::members!(QueryMode {});
-
-    impl codec::Query for QueryMode { type Report = ReportMode; }
 
     /// `ReportState` (F081h).
     ///
@@ -219,8 +215,6 @@ pub mod v1_0 {
         codec::enumeration!(Mode(u8), [(0, "Off")]);
     }
 
-    impl codec::Report for ReportState {}
-
     /// `ReportMode` (F082h).
     ///
     /// The mode; only names were added.
@@ -270,8 +264,6 @@ pub mod v1_0 {
 
         codec::enumeration!(Mode(u8), [(0, "Off"), (1, "On")]);
     }
-
-    impl codec::Report for ReportMode {}
 }
 
 /// The messages of services of version 1.1.
@@ -314,8 +306,6 @@ pub mod v1_1 {
     }
 
     codec::members!(QueryState { detail: "Detail" });
-
-    impl codec::Query for QueryState { type Report = ReportState; }
 
     /// `ReportState` (F081h).
     ///
@@ -372,8 +362,6 @@ pub mod v1_1 {
 
         codec::scaled!(Speed(u32), "Speed", 0.0_f64 to 327.67_f64 "meter per second", Round);
     }
-
-    impl codec::Report for ReportState {}
 }
 
 #[doc(inline)]

@@ -14,7 +14,7 @@ use crate::address::JausId;
 /// # use jaus::messages::mobility::primitive_driver;
 /// # async fn example(operator: Component) {
 /// let drivers = Audience::from(primitive_driver::LATEST);
-/// let results = operator.query_all(drivers, &QueryIdentification::default()).await;
+/// let results = operator.query_all(drivers, &QueryIdentification { query_type: 2.into() }).await;
 /// for (member, error) in results.failures() {
 ///     eprintln!("{member}: {error}");
 /// }

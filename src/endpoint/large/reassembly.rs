@@ -91,6 +91,22 @@ struct Run {
 }
 
 impl Run {
+    /// The run of one fragment with this piece of a message.
+    fn of(arrival: Arrival<'_>, piece: Bytes, position: i64) -> Self {
+        let (frame, data) = (arrival.frame, arrival.frame.flags.data());
+        Self {
+            version: frame.version,
+            priority: frame.flags.priority(),
+            last: frame.sequence,
+            begins: data == DataControl::First,
+            ends: data == DataControl::Last,
+            octets: piece.len(),
+            pieces: VecDeque::from([piece]),
+            updated: arrival.now,
+            position,
+        }
+    }
+
     fn covers(&self, first: u16, sequence: u16) -> bool {
         sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
     }
@@ -245,17 +261,7 @@ impl Sender {
             counters.add(Counter::FragmentsForgotten);
         }
         let piece = part_of_message(frame, arrival.held);
-        let run = Run {
-            version: frame.version,
-            priority: frame.flags.priority(),
-            last: sequence,
-            begins: data == DataControl::First,
-            ends: data == DataControl::Last,
-            octets: piece.len(),
-            pieces: VecDeque::from([piece]),
-            updated: arrival.now,
-            position: self.position,
-        };
+        let run = Run::of(arrival, piece, self.position);
         let place = self.insert(channel, sequence, run);
         let Some(run) = self.runs.get(&place) else {
             return Ok(None);
@@ -269,25 +275,46 @@ impl Sender {
         Ok(run.map(|run| (place, run)))
     }
 
+    /// The run that this fragment continues.
+    fn before(&self, channel: Channel, first: u16, run: &Run) -> Option<(Place, &Run)> {
+        let before = self.at_or_before(channel, first.wrapping_sub(1));
+        before.filter(|(_, known)| {
+            known.last.wrapping_add(1) == first
+                && known.is_continued_by(run)
+                && !self.is_stale(known)
+        })
+    }
+
+    /// The run that continues this one.
+    fn after(&self, channel: Channel, run: &Run) -> Option<(Place, &Run)> {
+        let after = (channel, run.last.wrapping_add(1));
+        let known = self.runs.get(&after).map(|known| (after, known));
+        known.filter(|(_, known)| run.is_continued_by(known) && !self.is_stale(known))
+    }
+
+    /// Octets of the run that a fragment would make with its neighbours.
+    fn length_with(&self, arrival: Arrival<'_>) -> usize {
+        let frame = arrival.frame;
+        let channel = channel(frame, arrival.path);
+        let run = Run::of(arrival, frame.payload.clone(), self.position);
+        let before = self.before(channel, frame.sequence, &run);
+        let neighbours = [before, self.after(channel, &run)];
+        let octets = neighbours.into_iter().flatten().map(|(_, it)| it.octets);
+        run.octets + octets.sum::<usize>()
+    }
+
     /// Inserts a new fragment next to its neighbours; returns the key of the run that holds it.
     fn insert(&mut self, channel: Channel, first: u16, mut run: Run) -> Place {
         let mut place = (channel, first);
-        let before = self.at_or_before(channel, first.wrapping_sub(1));
-        if let Some((before, known)) = before
-            && known.last.wrapping_add(1) == first
-            && known.is_continued_by(&run)
-            && !self.is_stale(known)
+        let before = self.before(channel, first, &run).map(|it| it.0);
+        if let Some(before) = before
             && let Some(mut longer) = self.take(before)
         {
             longer.append(run);
             (place, run) = (before, longer);
         }
-        let after = (channel, run.last.wrapping_add(1));
-        if let Some(known) = self.runs.get(&after)
-            && run.is_continued_by(known)
-            && !self.is_stale(known)
-            && let Some(next) = self.take(after)
-        {
+        let after = self.after(channel, &run).map(|it| it.0);
+        if let Some(next) = after.and_then(|after| self.take(after)) {
             run.append(next);
         }
         run.position = self.position;
@@ -315,6 +342,23 @@ impl Reassembly {
         Self {
             config,
             ..Self::default()
+        }
+    }
+
+    /// Checks that a fragment, which is about to be acknowledged, does not belong to a message above the
+    /// limit of length. What arrived of it stays, so that its repetitions are refused as well: otherwise
+    /// all fragments would be acknowledged in the end, and none delivered.
+    pub(in crate::endpoint) fn check_length(&self, arrival: Arrival<'_>) -> Result<(), Counter> {
+        let (frame, most) = (arrival.frame, self.config.max_message);
+        let sender = self.senders.get(&frame.source);
+        let is_too_long = |sender: &Sender| {
+            frame.flags.data() != DataControl::Single
+                && sender.cost + frame.payload.len() > most
+                && sender.length_with(arrival) > most
+        };
+        match sender.is_some_and(is_too_long) {
+            true => Err(Counter::MessageTooLong),
+            false => Ok(()),
         }
     }
 

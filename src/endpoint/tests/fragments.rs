@@ -572,3 +572,25 @@ fn the_arrival_of_each_part_of_an_unfinished_message_is_passed_on() {
     rig.hear(&parts[2]);
     assert_eq!((payloads(&mut rig).len(), &rig.inbox.parts), (1, &expected));
 }
+
+#[test]
+fn of_a_message_above_the_limit_not_all_fragments_are_acknowledged() {
+    let mut rig = Rig::with(Config {
+        max_message: 3000,
+        ..Config::default()
+    });
+    let mut parts = fragments(10, &large(4000), 1000);
+    for part in &mut parts {
+        part.flags = part.flags.with_acknowledgement(Acknowledgement::Request);
+    }
+    let mut acknowledged = BTreeSet::new();
+    for _ in 0..4 {
+        parts.iter().for_each(|part| rig.hear(part));
+        let answers = rig.sent().into_iter();
+        let answers = answers.filter(|(_, it)| it.is_acknowledgement());
+        acknowledged.extend(answers.map(|(_, it)| it.sequence));
+        rig.pass(Duration::from_millis(300));
+    }
+    assert!(acknowledged.into_iter().eq(10..13));
+    assert!(payloads(&mut rig).is_empty());
+}

@@ -27,6 +27,7 @@ fn a_message_is_delivered_with_all_that_its_header_says() {
             sequence: Some(1),
             path: Some(path(PEER_HOST)),
             to: US,
+            acknowledged: false,
         }]
     );
 }

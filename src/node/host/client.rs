@@ -321,6 +321,9 @@ impl Client {
                 sequence,
                 path,
             } => {
+                // A component that never reads has no more than its share of messages that stay.
+                let stays = flags.acknowledgement() == Acknowledgement::Request
+                    && self.mailbox.has_reserve(flags.priority());
                 self.mailbox.deliver(Received {
                     source,
                     destination,
@@ -331,6 +334,7 @@ impl Client {
                     payload: record.payload,
                     path,
                     to: self.id,
+                    acknowledged: stays,
                 });
             }
             Head::Progress { source } => self.mailbox.note_progress(now(), source),

@@ -218,9 +218,14 @@ fn is_sent_as(record: &Record, wanted: u64) -> bool {
 }
 
 fn delivery(message: Received) -> Record {
+    let flags = Flags::new(message.priority).with_broadcast(message.broadcast);
+    let flags = match message.acknowledged {
+        true => flags.with_acknowledgement(Acknowledgement::Request),
+        false => flags,
+    };
     Record {
         head: Head::Deliver {
-            flags: Flags::new(message.priority).with_broadcast(message.broadcast),
+            flags,
             source: message.source,
             destination: message.destination,
             sequence: message.sequence.unwrap_or_default(),

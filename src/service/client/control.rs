@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use super::Introduction;
+use super::news::{ControlLost, ControlNews, ControlRefused};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
@@ -17,72 +18,6 @@ use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
 /// Identifies one request for control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ControlId(u64);
-
-/// The progress of a request for control.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ControlNews {
-    /// The peer has granted it.
-    Granted,
-    /// The peer has not granted it, and the request is over.
-    Refused(ControlRefused),
-    /// The peer, under control, has reported a different status than before, by its code in Report
-    /// Status.
-    Status(u8),
-    /// It was granted and is lost for good: it is not requested again automatically.
-    Lost(ControlLost),
-    /// It was released: the peer has confirmed the release, or its control has timed out since, or
-    /// control of the peer was requested again.
-    Released,
-}
-
-/// Why control was not granted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ControlRefused {
-    /// Confirm Control with NOT_AVAILABLE.
-    #[error("it refuses control, for example because of an emergency")]
-    NotAvailable,
-    /// Confirm Control with INSUFFICIENT_AUTHORITY.
-    #[error("the authority {0} is below its minimum, or not above that of the client in control")]
-    InsufficientAuthority(u8),
-    /// Confirm Control with an undefined code.
-    #[error("it answered ConfirmControl with the undefined code {0}")]
-    Code(u8),
-    /// The peer has not answered.
-    #[error(
-        "it did not answer RequestControl with ConfirmControl: {} attempts in {:.1} s",
-        .0.tries, .0.waited.as_secs_f64()
-    )]
-    NoAnswer(NoAnswer),
-    /// The application already controls this peer.
-    #[error("this component already controls it or has requested control")]
-    Already,
-    /// The id has a wildcard or a zero.
-    #[error("it is not a single component")]
-    NotOneComponent,
-}
-
-/// Why control was lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ControlLost {
-    /// Reject Control with CONTROL_RELEASED: a client with a greater authority has it, or the peer
-    /// has reset it or timed it out.
-    #[error("the peer rejected control, for another client or because renewal was late")]
-    TakenBack,
-    /// The peer has become unavailable, for instance because of an emergency.
-    #[error("the peer no longer accepts control, for example because of an emergency")]
-    NotAvailable,
-    /// Another client with a greater authority has it: the renewal was refused.
-    #[error("another client with a higher authority has control")]
-    Outranked,
-    /// The peer has restarted and lost the control.
-    #[error("the peer restarted, or dropped control without notice")]
-    Restarted,
-    /// The peer has not confirmed it within its lifetime.
-    #[error("the peer has not confirmed control for {:.1} s", .0.as_secs_f64())]
-    Silent(Duration),
-}
 
 /// The control that one component has or requests.
 #[derive(Debug, Default)]
@@ -138,6 +73,9 @@ enum State {
     Lost(ControlLost),
     /// Being released since this time.
     Releasing(Instant),
+    /// The same after a request without an answer: the peer may have granted control all the same. The
+    /// application knows that the request is over.
+    GivenUp(Instant),
     /// The application knows that it has ended. The entry stays for as long as the peer may still
     /// answer a release.
     Over,
@@ -181,7 +119,7 @@ impl Controls {
         };
         if let Some(before) = self.all.remove(&peer) {
             control.released = before.released;
-            if before.state != State::Over {
+            if !matches!(before.state, State::Over | State::GivenUp(_)) {
                 self.news.push_back((before.id, ControlNews::Released));
             }
         }
@@ -201,7 +139,7 @@ impl Controls {
                 control.state = State::Over;
                 self.news.push_back((id, ControlNews::Released));
             }
-            State::Releasing(_) | State::Over => {}
+            State::Releasing(_) | State::GivenUp(_) | State::Over => {}
             // Otherwise the peer may keep its side of the control until it receives a release.
             State::Asking | State::Held | State::Lost(_) => {
                 control.state = State::Releasing(now);
@@ -231,12 +169,15 @@ impl Controls {
         out: &mut Outbox,
     ) -> Handled {
         let peer = message.source;
-        let known = self.all.get_mut(&peer);
-        let Some(control) = known.filter(|control| control.state != State::Over) else {
+        let Some(control) = self.all.get_mut(&peer) else {
             return Handled::No;
         };
+        let code = code_of(&message.payload);
+        if control.state == State::Over && code != Some(ConfirmControl::CODE) {
+            return Handled::No;
+        }
         let id = control.id;
-        let news = match code_of(&message.payload) {
+        let news = match code {
             Some(ConfirmControl::CODE) => read::<ConfirmControl>(message)
                 .and_then(|it| control.handle_confirm(now, peer, it.response_code.0, out)),
             Some(RejectControl::CODE) => read::<RejectControl>(message)
@@ -290,7 +231,9 @@ impl Controls {
         self.all.retain(|&peer, control| {
             let change = control.handle_timeout(now, peer, out);
             news.extend(change.map(|change| (control.id, change)));
-            if change.is_some_and(ControlNews::is_final) {
+            if change.is_some_and(ControlNews::is_final)
+                && !matches!(control.state, State::GivenUp(_))
+            {
                 control.state = State::Over;
             }
             control.state != State::Over || control.awaits_answer_to_release(now)
@@ -306,12 +249,6 @@ impl Controls {
     }
 }
 
-impl ControlNews {
-    const fn is_final(self) -> bool {
-        matches!(self, Self::Refused(_) | Self::Released)
-    }
-}
-
 impl Control {
     /// The longest interval between renewals. JAUS++ renews every 1.25 s.
     const RENEWAL: Duration = Duration::from_secs(1);
@@ -319,7 +256,7 @@ impl Control {
     /// when its client has been silent for a second.
     const STATUS: Duration = Duration::from_millis(200);
     /// A peer without Management does not report its status. After this many unanswered queries
-    /// they stop.
+    /// they become as rare as renewals; they do not stop, for the reports may have been lost.
     const STATUS_TRIES: u32 = 10;
     /// An unconfirmed renewal is repeated after this time, so that a few lost confirmations in a
     /// row do not cost control.
@@ -443,13 +380,13 @@ impl Control {
                 out.send(peer, &QueryControl {});
                 None
             }
-            // A renewal that was in flight when control was lost has regained it without the
-            // application's knowledge.
-            (State::Lost(_), 0) => {
+            // A request that was in flight when control was lost or given up has obtained it without
+            // the application's knowledge.
+            (State::Lost(_) | State::GivenUp(_) | State::Over, 0) => {
                 self.send_release(now, peer, out);
                 None
             }
-            (State::Lost(_) | State::Releasing(_) | State::Over, _) => None,
+            _ => None,
         }
     }
 
@@ -510,6 +447,10 @@ impl Control {
             }
             (State::Held, _) => self.lose(ControlLost::NotAvailable),
             (State::Releasing(_), _) => Some(ControlNews::Released),
+            (State::GivenUp(_), _) => {
+                self.state = State::Over;
+                None
+            }
             // The end of an earlier control.
             (State::Asking | State::Lost(_) | State::Over, _) => None,
         }
@@ -563,6 +504,7 @@ impl Control {
                     waited: now.saturating_duration_since(self.first_asked),
                 };
                 // Perhaps only the answers were lost, and the peer has granted control.
+                self.state = State::GivenUp(now);
                 self.send_release(now, peer, out);
                 Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
             }
@@ -585,7 +527,11 @@ impl Control {
             State::Releasing(since) if now >= since + Self::RELEASE_LIMIT => {
                 Some(ControlNews::Released)
             }
-            State::Releasing(_) => {
+            State::GivenUp(since) if now >= since + Self::RELEASE_LIMIT => {
+                self.state = State::Over;
+                None
+            }
+            State::Releasing(_) | State::GivenUp(_) => {
                 self.send_release(now, peer, out);
                 None
             }
@@ -599,16 +545,18 @@ impl Control {
             return;
         }
         let is_silent = self.status.reported.is_none() && self.status.asked >= Self::STATUS_TRIES;
-        self.status.next = (!is_silent).then(|| now + Self::STATUS);
-        if !is_silent {
-            self.status.asked = self.status.asked.saturating_add(1);
-            out.send(peer, &QueryStatus {});
-        }
+        let pause = match is_silent {
+            true => Self::RENEWAL,
+            false => Self::STATUS,
+        };
+        self.status.next = Some(now + pause);
+        self.status.asked = self.status.asked.saturating_add(1);
+        out.send(peer, &QueryStatus {});
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
         match self.state {
-            State::Asking | State::Releasing(_) => Some(self.next),
+            State::Asking | State::Releasing(_) | State::GivenUp(_) => Some(self.next),
             State::Held => {
                 let end = self.confirmed + self.lifetime();
                 [Some(self.next), Some(end), self.status.next]

@@ -15,15 +15,19 @@ mod subscriptions;
 mod tests;
 mod topic;
 
+pub use control::ControlId;
 pub(super) use control::Controls;
-pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
 pub(super) use introduction::Introduction;
-pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
+pub use news::{
+    ControlLost, ControlNews, ControlRefused, Outage, SubscriptionEnd, SubscriptionNews,
+};
 pub use rejection::Rejection;
 pub use session::{
     Retake, SessionId, SessionLoss, SessionOrder, SessionSettings, SessionState, TargetState,
 };
 pub(super) use session::{Sessions, Surroundings};
+#[cfg(feature = "node")]
+pub(crate) use subscriptions::OWN_REQUESTS;
 pub use subscriptions::SubscriptionId;
 pub(super) use subscriptions::Subscriptions;
 pub use topic::{CannotSubscribe, Topic, When};

@@ -1,7 +1,7 @@
-//! Notifications about a subscription.
+//! Notifications about subscriptions and control.
 
 use std::fmt;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
@@ -81,4 +81,76 @@ pub enum SubscriptionEnd {
         /// The required rate in hertz.
         least_hz: f64,
     },
+}
+
+/// The progress of a request for control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ControlNews {
+    /// The peer has granted it.
+    Granted,
+    /// The peer has not granted it, and the request is over.
+    Refused(ControlRefused),
+    /// The peer, under control, has reported a different status than before, by its code in Report
+    /// Status.
+    Status(u8),
+    /// It was granted and is lost for good: it is not requested again automatically.
+    Lost(ControlLost),
+    /// It was released: the peer has confirmed the release, or its control has timed out since, or
+    /// control of the peer was requested again.
+    Released,
+}
+
+/// Why control was not granted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlRefused {
+    /// Confirm Control with NOT_AVAILABLE.
+    #[error("it refuses control, for example because of an emergency")]
+    NotAvailable,
+    /// Confirm Control with INSUFFICIENT_AUTHORITY.
+    #[error("the authority {0} is below its minimum, or not above that of the client in control")]
+    InsufficientAuthority(u8),
+    /// Confirm Control with an undefined code.
+    #[error("it answered ConfirmControl with the undefined code {0}")]
+    Code(u8),
+    /// The peer has not answered.
+    #[error(
+        "it did not answer RequestControl with ConfirmControl: {} attempts in {:.1} s",
+        .0.tries, .0.waited.as_secs_f64()
+    )]
+    NoAnswer(NoAnswer),
+    /// The application already controls this peer.
+    #[error("this component already controls it or has requested control")]
+    Already,
+    /// The id has a wildcard or a zero.
+    #[error("it is not a single component")]
+    NotOneComponent,
+}
+
+/// Why control was lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlLost {
+    /// Reject Control with CONTROL_RELEASED: a client with a greater authority has it, or the peer
+    /// has reset it or timed it out.
+    #[error("the peer rejected control, for another client or because renewal was late")]
+    TakenBack,
+    /// The peer has become unavailable, for instance because of an emergency.
+    #[error("the peer no longer accepts control, for example because of an emergency")]
+    NotAvailable,
+    /// Another client with a greater authority has it: the renewal was refused.
+    #[error("another client with a higher authority has control")]
+    Outranked,
+    /// The peer has restarted and lost the control.
+    #[error("the peer restarted, or dropped control without notice")]
+    Restarted,
+    /// The peer has not confirmed it within its lifetime.
+    #[error("the peer has not confirmed control for {:.1} s", .0.as_secs_f64())]
+    Silent(Duration),
+}
+
+impl ControlNews {
+    pub(super) const fn is_final(self) -> bool {
+        matches!(self, Self::Refused(_) | Self::Released)
+    }
 }

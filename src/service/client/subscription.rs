@@ -40,9 +40,13 @@ pub(super) struct Subscription {
     /// The peer's number of the event.
     pub(super) event: Option<u8>,
     hz: Option<f64>,
+    /// Requests since the last answer, and when the first of them was sent.
     first_asked: Instant,
-    /// Requests since the last answer.
     asked: u32,
+    /// How long the peer took for its last answer, at most.
+    latency: Duration,
+    /// Answers that may still come to repeated requests, and until when. Each may be to another event.
+    owed: (u32, Instant),
     last_asked: Instant,
     /// When to send the next request: the first one, a repetition, or a renewal.
     next_ask: Option<Instant>,
@@ -114,6 +118,8 @@ impl Subscription {
             hz: None,
             first_asked: now,
             asked: 0,
+            latency: Duration::ZERO,
+            owed: (0, now),
             last_asked: now,
             next_ask: None,
             lifetime: None,
@@ -165,7 +171,34 @@ impl Subscription {
     pub(super) fn doubt(&mut self, now: Instant) {
         self.event = None;
         // A peer that gives every event the same number must not cause endless requests.
-        self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
+        self.next_ask = Some(now.max(self.last_asked + self.pause()));
+    }
+
+    /// Whether an answer is one to a repetition of a request that was answered before.
+    pub(super) fn is_to_repetition(&mut self, now: Instant) -> bool {
+        let (count, until) = self.owed;
+        let is_owed = self.asked == 0 && self.event.is_some() && count > 0 && now < until;
+        self.owed.0 -= u32::from(is_owed);
+        is_owed
+    }
+
+    /// Notes an answer to a request. Each of its repetitions may be answered, too.
+    fn handle_answer(&mut self, now: Instant) {
+        if self.asked > 0 {
+            // After an outage it tells how long that lasted.
+            if self.asked <= self.patience.tries {
+                self.latency = now.saturating_duration_since(self.first_asked);
+            }
+            let until = self.last_asked + self.latency.max(self.patience.interval) * 2;
+            self.owed = (self.asked - 1, until);
+        }
+        self.asked = 0;
+    }
+
+    /// How long to wait for an answer before the request is repeated.
+    fn pause(&self) -> Duration {
+        let usual = self.latency.saturating_mul(3) / 2;
+        self.patience.interval.max(usual.min(Self::LONGEST_PAUSE))
     }
 
     pub(super) fn handle_confirm(
@@ -187,14 +220,14 @@ impl Subscription {
         self.state = State::Up;
         self.event = Some(confirm.event_id);
         self.hz = confirmed;
-        self.asked = 0;
+        self.handle_answer(now);
         self.heard = now;
         self.sequence = None;
         self.next_ask = self.refresh().map(|pause| now + pause);
         if unasked {
             // A duplicate, or the peer's notice that the event has ended because it was not
             // renewed.
-            self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
+            self.next_ask = Some(now.max(self.last_asked + self.pause()));
         }
         if let Some(end) = self.too_slow() {
             news.push(SubscriptionNews::Ended(end));
@@ -399,11 +432,13 @@ impl Subscription {
             State::New => self.patience.interval,
             // Exponential backoff, to spare a peer that does not answer.
             State::Up | State::Down => self
-                .patience
-                .interval
+                .pause()
                 .saturating_mul(1 << self.asked.min(8))
                 .min(Self::LONGEST_PAUSE),
         };
+        if self.asked == 0 {
+            self.first_asked = now;
+        }
         self.asked = self.asked.saturating_add(1);
         self.last_asked = now;
         self.next_ask = Some(now + pause);

@@ -20,6 +20,10 @@ use crate::service::{Change, Handled, Outbox, Patience, code_of, read};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SubscriptionId(u64);
 
+/// The numbers of requests from this one on are for the application's own. Those before it are for
+/// subscriptions, so that no answer is taken for that to the other.
+pub(crate) const OWN_REQUESTS: u8 = 224;
+
 /// The subscriptions of one component.
 ///
 /// After the application's first subscription this table consumes every Event message, and cancels
@@ -101,11 +105,16 @@ impl Subscriptions {
             let mut requests = to_peer.clone().map(|it| it.request);
             requests.any(|it| it == request) || leaving.clone().any(|it| it.request == request)
         };
-        let candidates = (1..=u8::MAX).map(|step| self.last_request.wrapping_add(step));
-        let free = candidates.into_iter().find(|&request| !used(request));
+        let candidates = std::iter::successors(Some(self.after_last()), |it| Some(after(*it)));
+        let mut candidates = candidates.take(OWN_REQUESTS.into());
+        let free = candidates.find(|&request| !used(request));
         // Cancellations are few, and reusing the number of one does no harm.
-        self.last_request = free.unwrap_or_else(|| self.last_request.wrapping_add(1));
+        self.last_request = free.unwrap_or_else(|| self.after_last());
         Ok(self.last_request)
+    }
+
+    const fn after_last(&self) -> u8 {
+        after(self.last_request)
     }
 
     /// Ends a subscription, and cancels its event at the peer.
@@ -136,7 +145,7 @@ impl Subscriptions {
         if self.leaving.iter().any(known) {
             return;
         }
-        let request = self.last_request.wrapping_add(1);
+        let request = self.after_last();
         self.last_request = request;
         if self.leaving.len() >= Self::MOST_LEAVING {
             self.leaving.pop_front();
@@ -250,6 +259,11 @@ impl Subscriptions {
         let Some((&id, confirmed)) = all.find(|(_, it)| it.request == confirm.request_id) else {
             return Handled::No;
         };
+        if confirmed.is_to_repetition(now) {
+            // Some peers make an event of each repetition.
+            self.leave_if_spare(now, source, confirm.event_id, out);
+            return Handled::Yes;
+        }
         confirmed.handle_confirm(now, confirm, &mut news);
         self.doubt_the_displaced(now, id);
         let same = |it: &&mut Leaving| it.peer == source && it.event == confirm.event_id;
@@ -261,6 +275,14 @@ impl Subscriptions {
             .for_each(|it| it.tries = Self::CANCEL_TRIES);
         self.settle(now, id, news, out);
         Handled::Yes
+    }
+
+    /// Cancels an event that belongs to no subscription.
+    fn leave_if_spare(&mut self, now: Instant, peer: JausId, event: u8, out: &mut Outbox) {
+        let is_it = |it: &Subscription| it.peer == peer && it.event == Some(event);
+        if !self.alive.values().any(is_it) {
+            self.leave(now, peer, event, out);
+        }
     }
 
     /// A peer that assigns a number twice has restarted and lost the event that had it first.
@@ -291,6 +313,9 @@ impl Subscriptions {
         let Some((&id, refused)) = all.find(|(_, it)| it.request == request) else {
             return Handled::No;
         };
+        if refused.is_to_repetition(now) {
+            return Handled::Yes;
+        }
         let mut news = Vec::new();
         refused.handle_reject(now, reason, &mut news);
         self.settle(now, id, news, out);
@@ -378,6 +403,11 @@ impl Subscriptions {
     fn tell(&mut self, id: SubscriptionId, news: Vec<SubscriptionNews>) {
         self.news.extend(news.into_iter().map(|news| (id, news)));
     }
+}
+
+/// The number of the request after this one.
+const fn after(request: u8) -> u8 {
+    (request + 1) % OWN_REQUESTS
 }
 
 impl Leaving {

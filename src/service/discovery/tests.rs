@@ -68,6 +68,7 @@ impl Rig {
             payload: message.encode().unwrap(),
             sequence: None,
             path: Some(Path { link, peer }),
+            acknowledged: false,
         };
         let mut out = Outbox::new(US);
         self.discovery.hear(self.now, &received);
@@ -425,6 +426,7 @@ fn what_one_component_of_a_node_learns_the_others_know_also_when_it_is_gone() {
         payload: query(2).encode().unwrap(),
         sequence: None,
         path: None,
+        acknowledged: false,
     };
     let mut out = Outbox::new(US);
     node.first.hear(node.now, &call);

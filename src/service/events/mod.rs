@@ -39,7 +39,7 @@ use bytes::Bytes;
 use super::share::Share;
 use super::{Outbox, code_of, read};
 use crate::address::JausId;
-use crate::codec::{Message, ServiceId, report_code};
+use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::query_events::QueryEventsVar;
 use crate::messages::core::reject_event_request::ResponseCode;
@@ -151,14 +151,15 @@ impl Events {
         &mut self,
         now: Instant,
         message: &Received,
+        is_query: impl Fn(u16) -> bool,
         out: &mut Outbox,
     ) -> Outcome {
         match code_of(&message.payload) {
             Some(CreateEvent::CODE) => {
-                read(message).map_or(Outcome::Done, |it| create(message, &it, out))
+                read(message).map_or(Outcome::Done, |it| create(message, &it, is_query, out))
             }
             Some(UpdateEvent::CODE) => {
-                read(message).map_or(Outcome::Done, |it| self.update(message, &it, out))
+                read(message).map_or(Outcome::Done, |it| self.update(message, &it, is_query, out))
             }
             Some(CancelEvent::CODE) => {
                 if let Some(cancel) = read(message) {
@@ -195,7 +196,13 @@ impl Events {
         self.table.of(client).next().is_some()
     }
 
-    fn update(&self, message: &Received, update: &UpdateEvent, out: &mut Outbox) -> Outcome {
+    fn update(
+        &self,
+        message: &Received,
+        update: &UpdateEvent,
+        is_query: impl Fn(u16) -> bool,
+        out: &mut Outbox,
+    ) -> Outcome {
         let name = (message.source, update.event_id);
         if self.table.get(name).is_none() {
             reject(message, update.request_id, INVALID_EVENT, out);
@@ -209,7 +216,7 @@ impl Events {
             hertz: update.requested_periodic_rate_hz(),
             query: own(&update.query_message),
         };
-        check(trial, out)
+        check(trial, is_query, out)
     }
 
     fn cancel(&mut self, message: &Received, cancel: &CancelEvent, out: &mut Outbox) {
@@ -415,7 +422,12 @@ impl Events {
 }
 
 /// The trial of a new event.
-fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome {
+fn create(
+    message: &Received,
+    create: &CreateEvent,
+    is_query: impl Fn(u16) -> bool,
+    out: &mut Outbox,
+) -> Outcome {
     let trial = Trial {
         request: message.clone(),
         request_id: create.request_id,
@@ -424,7 +436,7 @@ fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome
         hertz: create.requested_periodic_rate_hz(),
         query: own(&create.query_message),
     };
-    check(trial, out)
+    check(trial, is_query, out)
 }
 
 fn create_command(message: &Received, create: CreateCommandEvent, out: &mut Outbox) -> Outcome {
@@ -450,9 +462,10 @@ fn is_the_same(one: &Subscriber, other: &Subscriber) -> bool {
 }
 
 /// Rejects requests that are invalid whatever the services answer.
-fn check(trial: Trial, out: &mut Outbox) -> Outcome {
+fn check(trial: Trial, is_query: impl Fn(u16) -> bool, out: &mut Outbox) -> Outcome {
     let why = match code_of(&trial.query) {
-        Some(code) if report_code(code).is_none() => ResponseCode::MESSAGE_NOT_SUPPORTED,
+        // A client may put a command in place of the query: nothing obeys it.
+        Some(code) if !is_query(code) => ResponseCode::MESSAGE_NOT_SUPPORTED,
         Some(_) if trial.query.len() > LONGEST_QUERY => ResponseCode::INVALID_EVENT_SETUP,
         // Events about events never have a report.
         Some(QueryEvents::CODE | QueryEventTimeout::CODE) => ResponseCode::MESSAGE_NOT_SUPPORTED,

@@ -2,30 +2,27 @@
 
 use std::time::Instant;
 
-use bytes::Bytes;
-
 use super::{Event, Stack};
 use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::service::client::{Introduction, Sessions, Surroundings};
 use crate::service::{
     Audience, CannotSubscribe, ControlId, ControlNews, ControlRefused, Handled, Inquiry, Patience,
-    QueryOptions, SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
+    QueryOptions, Question, SessionId, SessionOrder, SessionSettings, SubscriptionId, Topic,
 };
 
 impl Stack {
-    /// Sends a query to a peer and waits for its first message with the code `report`. If the peer
-    /// id has wildcards, the first answer of any matching component counts.
+    /// Sends a query to a peer and waits for its first report that answers it. If the peer id has
+    /// wildcards, the first answer of any matching component counts.
     pub fn ask(
         &mut self,
         now: Instant,
         peer: JausId,
-        query: Bytes,
-        report: u16,
+        question: Question,
         options: impl Into<QueryOptions>,
     ) -> Inquiry {
         self.inquiries
-            .ask(now, peer, query, report, options.into(), &mut self.out)
+            .ask(now, peer, question, options.into(), &mut self.out)
     }
 
     /// The peers whose queries would be repeated now, or time out, unless the owner reports

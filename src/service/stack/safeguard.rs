@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::Stack;
 use crate::endpoint::Received;
+use crate::messages::registry;
 use crate::service::control::Condition;
 use crate::service::life::Rank;
 use crate::service::safety;
@@ -18,6 +19,11 @@ pub(super) struct Faults {
     of_services: u32,
     /// Whether the application has reported a failure.
     of_application: bool,
+}
+
+/// Whether a message with this code is a query, and so has no effect but its answer.
+pub(super) fn is_query(services: &[Box<dyn Service>], code: u16) -> bool {
+    registry().report_of(code).is_some() || services.iter().any(|it| it.answers(code))
 }
 
 impl Stack {

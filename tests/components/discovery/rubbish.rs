@@ -42,6 +42,7 @@ fn message() -> impl Strategy<Value = Received> {
                 sequence: None,
                 path: None,
                 to: OWN,
+                acknowledged: false,
             }
         })
 }

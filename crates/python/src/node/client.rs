@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::report_code;
 use jaus::component::{Component, QueryOptions, When};
+use jaus::messages::registry;
 use jaus::node::now;
 use jaus::service::{Topic, code_of};
 
@@ -34,7 +34,7 @@ fn limit(seconds: f64) -> Result<Duration, Failure> {
 /// The code of the report that answers a query: as given, or by the standard's numbers.
 fn report_of(query: &[u8], given: Option<u16>) -> Result<u16, Failure> {
     let code = code_of(query).unwrap_or_default();
-    given.or_else(|| report_code(code)).ok_or_else(|| {
+    given.or_else(|| registry().report_of(code)).ok_or_else(|| {
         Failure::argument(format!(
             "{code:04X}h is not the code of a query: send it instead"
         ))

@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
-use jaus::codec::{ServiceId, report_code};
+use jaus::codec::ServiceId;
 use jaus::component::{
     AccessControl, Builder, Component as Runs, Condition, Handlers, Management, UndecodedFunctions,
     Validity,
 };
+use jaus::messages::registry;
 use jaus_binding::{
     Attended, Publications, Running, ServiceKey, follow_discovery, follow_standing, kind,
     service_id,
@@ -102,7 +103,7 @@ impl Component {
         report: Option<u16>,
     ) -> Result<(), Failure> {
         let report = report
-            .or_else(|| report_code(query))
+            .or_else(|| registry().report_of(query))
             .ok_or_else(|| Failure::argument(format!("{query:04X}h is not the code of a query")))?;
         self.add(urn, version, |_| Ok(Item::Publish(query, report)))?;
         self.publications.admit(query, report);

@@ -93,5 +93,6 @@ fn received(frame: &Frame, to: JausId) -> Received {
         payload: frame.payload.clone(),
         path: None,
         to,
+        acknowledged: false,
     }
 }

@@ -60,6 +60,7 @@ impl Rover {
             payload: message.encode().unwrap(),
             sequence: None,
             path,
+            acknowledged: false,
         };
         self.sent.clear();
         self.stack.handle_message(self.now, &received);

@@ -227,8 +227,8 @@ impl Running {
             Err(_) => unknown(Some(now)),
         };
         self.observed.set(motion);
-        self.component.changed::<QueryGlobalPose>().await;
-        self.component.changed::<QueryGlobalPoseExt>().await;
+        _ = self.component.changed::<QueryGlobalPose>().await;
+        _ = self.component.changed::<QueryGlobalPoseExt>().await;
     }
 }
 

@@ -167,7 +167,7 @@ async fn follow(component: &Component, zones: &OperatingZones) -> Result<Infalli
             Err(_) => None,
         };
         if zones.handle_place(place) {
-            component.changed::<QueryExcursion>().await;
+            _ = component.changed::<QueryExcursion>().await;
         }
     }
 }

@@ -164,8 +164,8 @@ impl Running {
                 }
             };
             self.observed.set(standing(pose, sampled_at));
-            self.component.changed::<QueryLocalPose>().await;
-            self.component.changed::<QueryLocalPoseExt>().await;
+            _ = self.component.changed::<QueryLocalPose>().await;
+            _ = self.component.changed::<QueryLocalPoseExt>().await;
             self.keep();
         }
     }

@@ -190,7 +190,7 @@ impl Running {
             self.check_motors(&mut faults).await;
             self.telemetry.set_speed(self.vehicle.motion().velocity.x);
             if self.board.tell(self.stage(&watchman)) {
-                self.component.changed::<QueryStage>().await;
+                _ = self.component.changed::<QueryStage>().await;
             }
             tokio::select! {
                 changed = standings.changed() => changed.map_err(|_| PartError::NodeStopped)?,
@@ -213,7 +213,7 @@ impl Running {
             tracing::warn!("emergency: {why}");
             self.stopped = true;
             self.vehicle.stop();
-            self.component.set_condition(Condition::Stopped).await;
+            _ = self.component.set_condition(Condition::Stopped).await;
             return;
         }
         if !self.stopped {
@@ -222,10 +222,10 @@ impl Running {
         if self.component.standing().state != State::Emergency {
             // The application has declared it safe, or the state is not reported yet.
             self.vehicle.stop();
-            self.component.set_condition(Condition::Stopped).await;
+            _ = self.component.set_condition(Condition::Stopped).await;
         } else if open.is_none() {
             tracing::warn!("the stop input is closed again: its emergency ends");
-            self.component.set_condition(Condition::StopReleased).await;
+            _ = self.component.set_condition(Condition::StopReleased).await;
             self.stopped = false;
             // The component must be resumed before anything moves.
             self.interlock.close();
@@ -241,7 +241,7 @@ impl Running {
             None => faults.is_over(),
         };
         if let Some(condition) = condition {
-            self.component.set_condition(condition).await;
+            _ = self.component.set_condition(condition).await;
         }
     }
 

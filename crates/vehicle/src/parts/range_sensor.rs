@@ -63,7 +63,7 @@ impl Part for RangeSensor {
                 slot.telemetry.set_sampled("scan", now());
             }
             sensor.publish(scan.as_ref(), slot.time.system_time());
-            component.changed::<QueryRangeSensorData>().await;
+            _ = component.changed::<QueryRangeSensorData>().await;
         }
     }
 }

@@ -86,6 +86,7 @@ impl Rover {
             payload,
             sequence: None,
             path: None,
+            acknowledged: false,
         };
         self.stack.handle_message(self.now, &received);
         let mut answers = 0;

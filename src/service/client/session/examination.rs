@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::control::ControlLost;
+use super::super::news::ControlLost;
 use super::SessionLoss;
 use crate::address::JausId;
 use crate::codec::Message;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::super::control::{ControlLost, ControlRefused};
+use super::super::news::{ControlLost, ControlRefused};
 use crate::address::JausId;
 use crate::service::State;
 

@@ -394,10 +394,55 @@ fn a_peer_under_control_is_asked_for_its_status_and_every_change_is_news() {
 }
 
 #[test]
-fn a_peer_that_has_no_status_is_asked_for_it_ten_times_at_most() {
+fn a_peer_that_reports_no_status_is_asked_for_it_less_often_but_for_ever() {
     let (mut bench, _) = held(5);
-    bench.run_ms(4900);
-    assert_eq!(bench.sent::<QueryStatus>().len(), 10);
+    let mut asked = Vec::new();
+    for _ in 0..4 {
+        let end = bench.now + Duration::from_secs(2);
+        let mut queries = 0;
+        while bench.now < end {
+            bench.run_ms(10);
+            for sent in std::mem::take(&mut bench.sent) {
+                match code_of(&sent.1) {
+                    Some(QueryStatus::CODE) => queries += 1,
+                    Some(RequestControl::CODE) => bench.hear(PEER, &confirm(0)),
+                    _ => {}
+                }
+            }
+        }
+        asked.push(queries);
+    }
+    assert_eq!(asked, [11, 2, 2, 2]);
+    bench.hear(PEER, &status(2));
+    assert_eq!(news(&mut bench), [ControlNews::Status(2)]);
+}
+
+#[test]
+fn what_a_peer_grants_after_its_request_was_given_up_is_released() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.run_ms(1500);
+    assert_eq!(
+        bench.sent::<ReleaseControl>().len(),
+        1,
+        "it may have granted it"
+    );
+    bench.run_ms(2000);
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 4, "until it answers");
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
+    bench.hear(PEER, &reject(0));
+    bench.run_ms(1000);
+    assert_eq!(bench.sent::<ReleaseControl>(), [], "it has answered");
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(
+        bench.sent::<ReleaseControl>().len(),
+        1,
+        "a late confirmation"
+    );
+    let [ControlNews::Refused(_)] = news(&mut bench)[..] else {
+        panic!("the application knows that the request is over");
+    };
 }
 
 #[test]
@@ -424,7 +469,7 @@ fn held_before_the_release_arrives() -> Bench {
     let [ControlNews::Refused(ControlRefused::NoAnswer(_))] = news(&mut bench)[..] else {
         panic!("it is given up");
     };
-    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 4, "every 0.5 s");
     request(&mut bench);
     bench.hear(PEER, &confirm(0));
     assert_eq!(news(&mut bench), [ControlNews::Granted]);
@@ -477,7 +522,7 @@ fn a_client_tells_its_incarnation_before_it_requests_control() {
     assert_eq!(
         bench.sent::<QueryIncarnation>(),
         [QueryIncarnation {
-            incarnation,
+            sender_incarnation: incarnation,
             stamp: 0
         }]
     );
@@ -496,7 +541,7 @@ fn control_is_lost_when_the_peer_is_another_incarnation() {
     assert_eq!(news(&mut bench), []);
     // As a component does that has been granted a renewal as if it were a first request.
     let restarted = QueryIncarnation {
-        incarnation: 8,
+        sender_incarnation: 8,
         stamp: 0,
     };
     bench.hear(PEER, &restarted);

@@ -177,3 +177,20 @@ fn a_confirmation_of_one_subscription_leaves_others_with_that_request_alone() {
     bench.run_ms(500);
     assert_eq!(requests(&mut bench), [numbers[0]], "still not confirmed");
 }
+
+#[test]
+fn no_request_has_a_number_of_the_applications_own() {
+    let mut bench = Bench::new();
+    for _ in 0..300 {
+        let id = subscribe(&mut bench, &status(When::OnChange));
+        let asked = bench.sent::<CreateEvent>();
+        assert!(asked[0].request_id < 224, "{}", asked[0].request_id);
+        confirm(&mut bench, asked[0].request_id, 7, 0.0);
+        bench.stack.unsubscribe(bench.now, id);
+        bench.collect();
+        let cancelled = bench.sent::<CancelEvent>();
+        assert!(cancelled.iter().all(|it| it.request_id < 224));
+        bench.run_ms(5000);
+        bench.sent.clear();
+    }
+}

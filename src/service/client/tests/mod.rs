@@ -86,6 +86,7 @@ impl Bench {
             sequence: self.number,
             path: None,
             to: CLIENT,
+            acknowledged: false,
         };
         self.number = self.number.map(|number| number.wrapping_add(1));
         self.stack.handle_message(self.now, &message);

@@ -1,7 +1,8 @@
 //! Sequence numbers and timeouts of report streams.
 
-use super::subscriptions::{Notice, confirm, fire, notices, up};
-use crate::messages::core::CreateEvent;
+use super::Bench;
+use super::subscriptions::{Notice, confirm, fire, notices, status, subscribe, up};
+use crate::messages::core::{CancelEvent, CreateEvent};
 use crate::service::{Outage, When};
 
 #[test]
@@ -83,4 +84,26 @@ fn numbers_that_the_rate_cannot_explain_are_no_lost_reports() {
     let report = |lost| Notice::Report { lost };
     let reports = [report(0), report(0), report(0), report(2)];
     assert_eq!(notices(&mut bench), reports);
+}
+
+#[test]
+fn a_peer_that_confirms_late_keeps_one_event_and_is_asked_no_more() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(10.0)));
+    bench.run_ms(600);
+    let asked = bench.sent::<CreateEvent>();
+    assert_eq!(asked.len(), 2, "it is slower than the first repetition");
+    // It makes an event of each request.
+    confirm(&mut bench, asked[0].request_id, 1, 10.0);
+    bench.run_ms(500);
+    confirm(&mut bench, asked[1].request_id, 2, 10.0);
+    let cancelled = bench.sent::<CancelEvent>();
+    assert!(matches!(cancelled[..], [CancelEvent { event_id: 2, .. }]));
+    for sequence in 0..100 {
+        fire(&mut bench, 1, sequence);
+        bench.run_ms(100);
+        assert_eq!(bench.sent::<CreateEvent>(), []);
+    }
+    let is_down = |it: &Notice| matches!(it, Notice::Down(_) | Notice::Ended(_));
+    assert!(!notices(&mut bench).iter().any(is_down));
 }

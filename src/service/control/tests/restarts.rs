@@ -21,7 +21,7 @@ impl Rig {
     /// The client tells its incarnation, as it does before it requests control.
     fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
         let query = QueryIncarnation {
-            incarnation,
+            sender_incarnation: incarnation,
             stamp: 0,
         };
         self.hear(client, &query)

@@ -171,6 +171,7 @@ fn begin(events: &mut Events, rig: &Rig, source: JausId, code: u16, out: &mut Ou
         payload: Bytes::new(),
         sequence: None,
         path: None,
+        acknowledged: false,
     };
     let create = CreateCommandEvent {
         command_message: Bytes::copy_from_slice(&code.to_le_bytes()),

@@ -416,3 +416,26 @@ fn a_client_is_told_of_its_own_events_by_each_question() {
         assert_eq!(ids, expected, "{question:?}");
     }
 }
+
+#[test]
+fn the_queries_of_an_own_service_are_subscribed_to_whatever_their_codes_and_its_commands_are_not() {
+    let obeyed = Arc::new(AtomicU16::new(0));
+    let obeys = obeyed.clone();
+    let own = Handlers::undecoded(COUNTER)
+        .answer(0xD1F0, |_| Some(Bytes::from_static(&[0xF2, 0xD1, 7])))
+        .receive(0xD1F3, move |_, _| {
+            obeys.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+    let mut rig = StackRig::new(vec![Box::new(own)], |stack| stack);
+    let create = |code: u16| CreateEvent {
+        query_message: Bytes::copy_from_slice(&code.to_le_bytes()),
+        ..on_change(1)
+    };
+    let said = rig.hear(CLIENT, &create(0xD1F0));
+    answer::<ConfirmEventRequest>(&said);
+    assert_eq!(events(&said)[0].report_message[2], 7);
+    let said = rig.hear(CLIENT, &create(0xD1F3));
+    answer::<RejectEventRequest>(&said);
+    assert_eq!(obeyed.load(Ordering::Relaxed), 0);
+}

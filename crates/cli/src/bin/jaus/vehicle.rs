@@ -239,7 +239,7 @@ impl VehicleCommand {
                 Ok(()) = standings.changed() => {
                     let now = *standings.borrow_and_update();
                     if now.state == State::Initialize {
-                        component.set_condition(Condition::Initialized).await;
+                        _ = component.set_condition(Condition::Initialized).await;
                     }
                     let before = std::mem::replace(&mut standing, now);
                     if let Some(words) = standing_in_words(&before, &now) {

@@ -15,7 +15,7 @@ use crate::gateway::course::{Entries, Want};
 use jaus::codec::Message as _;
 use jaus::endpoint::Received;
 use jaus::messages::mobility::ReportActiveElement;
-use jaus::service::{Inquiry, NoAnswer, Stack};
+use jaus::service::{Inquiry, NoAnswer, Question, Stack};
 
 impl RaClient {
     /// Maximum number of lists.
@@ -109,7 +109,8 @@ impl RaClient {
                 Want::Send(payload) => stack.send_octets(peer.id, payload),
                 Want::Ask(query) => {
                     let report = ReportActiveElement::CODE;
-                    let inquiry = stack.ask(now, peer.id, query, report, self.patience);
+                    let inquiry =
+                        stack.ask(now, peer.id, Question::new(query, report), self.patience);
                     self.active.insert(inquiry, at);
                 }
                 Want::Refuse(code, why) => refuse(now, tally, code, &why),

@@ -33,8 +33,8 @@ use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::ReleaseControl;
 use jaus::service::{
-    ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack, SubscriptionId,
-    SubscriptionNews, Topic, When, code_of,
+    ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Question, Stack,
+    SubscriptionId, SubscriptionNews, Topic, When, code_of,
 };
 
 /// Requests of an RA component to JAUS components.
@@ -188,9 +188,10 @@ impl RaClient {
             return request.refuse(Counter::TooManyWaiting);
         }
         request.tally.add(Counter::QueriesFromRa);
-        let inquiry = request
-            .stack
-            .ask(now, peer.id, payload, report, self.patience);
+        let inquiry =
+            request
+                .stack
+                .ask(now, peer.id, Question::new(payload, report), self.patience);
         self.asked.insert(inquiry, (message.clone(), peer));
     }
 

@@ -7,7 +7,7 @@ use jaus::address::JausId;
 use jaus::messages::mobility::{
     QueryGlobalVector, QueryLocalVector, ReportGlobalVector, ReportLocalVector,
 };
-use jaus::service::{Event, Patience};
+use jaus::service::{Event, Patience, Question};
 use jaus_ra::gateway::Settings;
 
 use crate::gateway::world::{World, subsystem};
@@ -30,7 +30,12 @@ fn ask<R: jaus::codec::Message>(
     world.run(Duration::from_secs(10));
     let (now, payload) = (world.now, query.encode().unwrap());
     let stack = &mut world.jaus[operator].stack;
-    stack.ask(now, driver, payload, R::CODE, Patience::default());
+    stack.ask(
+        now,
+        driver,
+        Question::new(payload, R::CODE),
+        Patience::default(),
+    );
     world.settle();
     let asked = world.ra_heard(ra, code - 0x2000).remove(0);
     world.ra_says(ra, &asked.answer(code, bytes(report)));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
-use jaus::service::{Event, Kind};
+use jaus::service::{Event, Kind, Question};
 use jaus_ra::gateway::Settings;
 use jaus_ra::{Message, RaId};
 use jaus_vehicle::ground::WorldStore;
@@ -108,7 +108,7 @@ fn a_jaus_client_uses_an_ra_store() {
     let patience = jaus::service::Patience::default();
     let payload = query.encode().unwrap();
     let (now, code) = (world.now, ReportVksBounds::CODE);
-    let inquiry = stack.ask(now, store, payload, code, patience);
+    let inquiry = stack.ask(now, store, Question::new(payload, code), patience);
     world.settle();
     let heard = world.ra_heard(ra, 0x2A22);
     let bounds = Bytes::from_static(&[

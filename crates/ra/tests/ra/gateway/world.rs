@@ -11,8 +11,8 @@ use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::rights::Acceptance;
 use jaus::service::{
-    Discovery, Event, Inquiry, Kind, Liveness, Patience, Profile, Scope, Service, Stack, Timing,
-    Transport,
+    Discovery, Event, Inquiry, Kind, Liveness, Patience, Profile, Question, Scope, Service, Stack,
+    Timing, Transport,
 };
 use jaus_ra::carrier::To;
 use jaus_ra::gateway::{Action, Counter, Gateway, Settings};
@@ -330,6 +330,7 @@ impl World {
             payload: message.payload.clone(),
             sequence: None,
             path: None,
+            acknowledged: false,
         };
         let meant = |id: &JausId| *id != message.source && message.destination.matches(*id);
         let attached: Vec<JausId> = self.attached.iter().copied().filter(meant).collect();
@@ -368,7 +369,7 @@ impl World {
         };
         let payload = query.encode().unwrap();
         let stack = &mut self.jaus[who].stack;
-        let inquiry = stack.ask(self.now, peer, payload, R::CODE, patience);
+        let inquiry = stack.ask(self.now, peer, Question::new(payload, R::CODE), patience);
         self.run(Duration::from_millis(2100));
         let answer = self.answer(who, inquiry)?;
         Some(R::decode(&answer).unwrap())

@@ -301,7 +301,7 @@ impl<L: Language> Next<L> {
             None => self.sensors.is_over(),
         };
         if let Some(condition) = condition {
-            self.component.set_condition(condition).await;
+            _ = self.component.set_condition(condition).await;
         }
     }
 
@@ -353,7 +353,7 @@ impl<L: Language> Next<L> {
             }
         }
         if self.board.tell(report) {
-            self.component.changed::<QueryStage>().await;
+            _ = self.component.changed::<QueryStage>().await;
         }
     }
 }

@@ -139,10 +139,10 @@ impl<'a> PlannerTask<'a> {
         let now = now();
         let (answer, news) = self.missions.tell(|mission| words(mission, now));
         if news.mission {
-            self.component.changed::<QueryMission>().await;
+            _ = self.component.changed::<QueryMission>().await;
         }
         if news.path {
-            self.component.changed::<QueryPlannedPath>().await;
+            _ = self.component.changed::<QueryPlannedPath>().await;
         }
         self.log();
         answer

@@ -44,7 +44,7 @@ impl Switch {
             report.state = State::BLOCKED;
             report.reason = reason.into();
         }
-        component.changed::<QueryStage>().await;
+        _ = component.changed::<QueryStage>().await;
     }
 
     pub(crate) async fn set(&self, component: &Component, state: State, reason: &str) {
@@ -55,7 +55,7 @@ impl Switch {
             // As if it commanded the next stage; without one, it has suspended motion.
             report.next_subsystem_id = 1;
         }
-        component.changed::<QueryStage>().await;
+        _ = component.changed::<QueryStage>().await;
     }
 }
 

@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::codec::{Message, report_code};
+use jaus::codec::Message;
 use jaus::endpoint::{Event, Outgoing, Received};
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
     report_identification::Type,
 };
+use jaus::messages::registry;
 use jaus::node::{Config, Events, Node, Port, Tap, Tapped, Way};
 use jaus::peer::Recogniser;
 use jaus::wire::{Broadcast, Frame, judp};
@@ -218,7 +219,7 @@ impl JudgeNodes {
         let Some(code) = code_of(&received.payload) else {
             return Ok(false);
         };
-        if report_code(code).is_none() {
+        if registry().report_of(code).is_none() {
             return Ok(false);
         }
         if received.source == self.subject {

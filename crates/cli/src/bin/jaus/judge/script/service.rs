@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::{Message as _, report_code};
+use jaus::codec::Message as _;
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, QueryElement, RegisterServices,
     ReleaseControl, RequestControl, SetEmergency, UpdateEvent, access_control,
@@ -173,9 +173,8 @@ fn report_of<'a>(
     service: &'a Service,
     query: &Message,
 ) -> Option<&'a Arc<Message>> {
-    let code = report_code(query.code)?;
-    let mut vocabulary = library.vocabulary(service);
-    vocabulary.find_map(|(_, message)| (message.code == code).then_some(message))
+    let mut declaring = library.lineage(service);
+    declaring.find_map(|it| it.report_of(query))
 }
 
 /// Sends a query that may remain unanswered: another step checks that.
