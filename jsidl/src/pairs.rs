@@ -74,8 +74,6 @@ const fn standard_report(query: u16) -> Option<u16> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn every_query_of_the_catalogue_has_its_report() {
         let mut loader = crate::Loader::new();

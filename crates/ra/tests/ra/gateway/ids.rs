@@ -78,7 +78,7 @@ fn station(world: &mut World) -> usize {
 
 fn is_answered(world: &mut World, station: usize) -> bool {
     let query = QueryVelocityState {
-        presence_vector: u16::MAX.into(),
+        presence_vector: u16::MAX,
     };
     world
         .ask::<ReportVelocityState>(station, VEHICLE, &query)

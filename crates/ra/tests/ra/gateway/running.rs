@@ -1,5 +1,11 @@
 //! The running gateway with a JAUS vehicle on loopback: what its node and its log tell it.
 
+#![expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "a test with real sockets and time"
+)]
+
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

@@ -135,6 +135,7 @@ fn a_vehicle_whose_container_keeps_the_first_content_is_named_by_each_change() {
     let mut output = BufReader::new(vehicle.stdout.take().unwrap());
     let mut lines = output.by_ref().lines();
     if !lines.any(|line| line.unwrap().contains("Ctrl-C")) {
+        vehicle.wait().unwrap();
         return eprintln!("SKIPPED: no mount here");
     }
     is_not_taken(&outside.keys(&["revoke", "operator"]));
