@@ -24,6 +24,8 @@ pub(crate) struct News {
     pub(crate) ended: Vec<(u16, bool)>,
     /// Faults (`Err`) and recoveries (`Ok`), in the order of their reports.
     pub(crate) faults: Vec<Result<(), StopCause>>,
+    /// A client whose setpoints may be too old to move anything.
+    pub(crate) late: Option<JausId>,
     /// The client that is to have control.
     pub(crate) handover: Option<Controller>,
 }
@@ -98,9 +100,13 @@ impl<'a> Context<'a> {
         message: &Received,
         validity: Validity,
     ) -> bool {
-        if validity != Validity::UntilDone && !self.life.admits(now, message) {
-            self.order
-                .refuse(message, "it may have been held up on its way");
+        if validity != Validity::UntilDone && self.life.is_late(message) {
+            self.order.refuse(message, "it was held up");
+            return false;
+        }
+        if validity != Validity::UntilDone && !self.life.is_fresh(now, message.source) {
+            self.order.refuse(message, "it may be too old");
+            self.news.late = Some(message.source);
             return false;
         }
         self.order.admits(now, message, validity)

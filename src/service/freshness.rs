@@ -22,6 +22,8 @@ pub(super) struct Freshness {
     sent: VecDeque<(u32, Instant)>,
     /// When the stamp was sent that was echoed last.
     echoed: Option<Instant>,
+    /// Since when it is asked again and again.
+    begun: Option<Instant>,
     /// What setpoints and what other messages must not be behind.
     late: Settled,
     outdated: Settled,
@@ -33,6 +35,7 @@ impl Default for Freshness {
             stamp: 0,
             sent: VecDeque::new(),
             echoed: None,
+            begun: None,
             late: Settled::after(Self::LATE),
             outdated: Settled::after(MEMORY),
         }
@@ -46,6 +49,12 @@ impl Freshness {
     const LATE: Duration = Duration::from_millis(500);
     /// Stamps that are remembered: more than are sent within [`OLDEST`](Self::OLDEST).
     const MOST: usize = 16;
+
+    /// It is asked again and again from now on. Until its first echo is due it gets the benefit of the doubt, because
+    /// some clients send a single command as soon as they are in control.
+    pub(super) const fn begin(&mut self, now: Instant) {
+        self.begun = Some(now);
+    }
 
     /// The stamp of a query that is sent now; never 0.
     pub(super) fn stamp(&mut self, now: Instant) -> u32 {
@@ -75,15 +84,20 @@ impl Freshness {
         self.echoed
     }
 
-    /// How old what it says now can be; `None` before its first echo.
+    /// How old what it says now can be; `None` if it was never asked.
     pub(super) fn age(&self, now: Instant) -> Option<Duration> {
-        Some(now.saturating_duration_since(self.echoed?))
+        let since = self.echoed.max(self.begun)?;
+        Some(now.saturating_duration_since(since))
     }
 
-    /// Whether a setpoint with this number is young enough to move something.
-    pub(super) fn admits(&self, now: Instant, number: Option<u16>) -> bool {
-        let is_late = number.is_some_and(|it| self.late.is_behind(it));
-        !is_late && self.age(now).is_some_and(|age| age <= Self::OLDEST)
+    /// Whether what it says now is young enough to move something.
+    pub(super) fn is_fresh(&self, now: Instant) -> bool {
+        self.age(now).is_none_or(|age| age <= Self::OLDEST)
+    }
+
+    /// Whether the setpoint with this number was held up by itself.
+    pub(super) fn is_late(&self, number: u16) -> bool {
+        self.late.is_behind(number)
     }
 
     /// Whether the message with this number is older than any retransmission.

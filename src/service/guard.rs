@@ -77,6 +77,8 @@ pub enum StopCause {
     Expired(JausId),
     /// The client has shown no life.
     ControllerSilent(JausId),
+    /// What the client sends may be too old: the network holds it up.
+    Late(JausId),
     /// The client has restarted: whoever commanded the motion is gone.
     Restarted(JausId),
     /// Control was released, lost, or taken over.
@@ -124,6 +126,7 @@ impl fmt::Display for StopCause {
         match self {
             Self::Expired(client) => write!(f, "{client} did not repeat its command in time"),
             Self::ControllerSilent(client) => write!(f, "{client} is silent"),
+            Self::Late(client) => write!(f, "what {client} sends arrives too late"),
             Self::Restarted(client) => write!(f, "{client} has restarted"),
             Self::ControlChanged => f.write_str("control was released, lost or taken over"),
             Self::Standby => f.write_str("the component is in standby"),
@@ -486,6 +489,7 @@ mod tests {
             ),
             (StopCause::ControllerSilent(OWNER), "42.1.1 is silent"),
             (StopCause::Restarted(OWNER), "42.1.1 has restarted"),
+            (StopCause::Late(OWNER), "what 42.1.1 sends arrives too late"),
             (StopCause::Fault("no current".to_owned()), "no current"),
             (StopCause::PoseStale(late), "the pose is 2.5 s old"),
             (StopCause::Hung(late), "the component was delayed for 2.5 s"),

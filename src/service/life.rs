@@ -70,8 +70,9 @@ pub struct Life {
 struct Peer {
     /// Whether it is still the same.
     watch: RestartWatch,
-    /// How old what it says can be, if it tells its incarnation.
+    /// How old what it says can be, if it tells its incarnation, and whether it is asked all the time.
     freshness: Freshness,
+    is_checked: bool,
     /// When it was last asked whether it is still the same.
     asked: Option<Instant>,
     /// When it was last asked to tell its incarnation, which it has not told yet.
@@ -153,6 +154,7 @@ impl Life {
             Peer {
                 watch: RestartWatch::of(announced.map(|(_, _, incarnation)| incarnation)),
                 freshness: Freshness::default(),
+                is_checked: false,
                 asked: None,
                 introduced: None,
                 is_doubtful: false,
@@ -165,6 +167,10 @@ impl Life {
                 look: now + rank.patience(),
             }
         });
+        if rank.is_checked() && !peer.is_checked {
+            peer.is_checked = true;
+            peer.freshness.begin(now);
+        }
         let check = peer.next_check(now, rank);
         let probe = Some(peer.alive + rank.patience()).filter(|_| peer.probes == 0);
         let soon = probe.into_iter().chain(check).min();
@@ -218,12 +224,19 @@ impl Life {
             .is_some_and(|(peer, number)| peer.freshness.is_outdated(number))
     }
 
-    /// Whether a setpoint is young enough to move something, as far as its sender shows that: a client in control that
-    /// tells its incarnation must have echoed a recent stamp.
-    pub fn admits(&self, now: Instant, message: &Received) -> bool {
-        let peer = self.peers.get(&message.source);
+    /// Whether what a peer says now is young enough to move something, as far as it shows that: a client in control
+    /// that tells its incarnation must have echoed a recent stamp.
+    pub fn is_fresh(&self, now: Instant, id: JausId) -> bool {
+        let peer = self.peers.get(&id);
         peer.filter(|it| it.watch.incarnation().is_some())
-            .is_none_or(|it| it.freshness.admits(now, number_of(message)))
+            .is_none_or(|it| it.freshness.is_fresh(now))
+    }
+
+    /// Whether a setpoint was held up by itself, and others of its client were not.
+    pub fn is_late(&self, message: &Received) -> bool {
+        let peer = self.peers.get(&message.source);
+        peer.zip(number_of(message))
+            .is_some_and(|(peer, number)| peer.freshness.is_late(number))
     }
 
     /// Asks a watched peer that offers [`Incarnation`] for its incarnation until it has answered once. A client of
@@ -282,6 +295,7 @@ impl Life {
             self.due.remove(&(look, id));
             match (self.peers.get_mut(&id), rank(id)) {
                 (Some(peer), Some(rank)) => {
+                    peer.is_checked &= rank.is_checked();
                     let silence = now.saturating_duration_since(peer.alive);
                     if silence >= Self::DEATH && peer.is_probed() {
                         self.peers.remove(&id);
@@ -372,7 +386,7 @@ impl Peer {
         }
         if self.watch.incarnation().is_some() {
             let age = self.freshness.age(now);
-            let is_doubtful = age.is_none_or(|age| age > Freshness::OLDEST / 2);
+            let is_doubtful = age.is_some_and(|age| age > Freshness::OLDEST / 2);
             let pause = match is_doubtful {
                 true => Life::NUMBER_CHECK,
                 false => Life::CHECK,

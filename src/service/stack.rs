@@ -546,6 +546,12 @@ impl Stack {
     /// Passes what the services have reported on to control.
     fn follow_services(&mut self, now: Instant) {
         self.follow_faults();
+        if let Some(client) = self.news.late.take()
+            && self.is_moving()
+        {
+            tracing::warn!(id = %self.id(), %client, "stopped: what the client sends arrives too late");
+            self.stop(&StopCause::Late(client));
+        }
         if let Some(to) = self.news.handover.take() {
             self.control.hand_over(now, to, &mut self.out);
         }

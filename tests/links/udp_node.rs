@@ -224,6 +224,10 @@ async fn a_component_that_does_not_read_stops_nobody_and_keeps_the_urgent() {
     let b = start(102, 1, group);
     let (mut lazy, mut eager) = (a.attach(1).unwrap(), a.attach(2).unwrap());
     let sender = b.attach(1).unwrap();
+    // The first message to a new peer asks for an acknowledgement, and what is acknowledged stays.
+    let first = sender.deliver(to(&sender, lazy.id(), QUERY_HEARTBEAT));
+    assert_eq!(within_limit(first).await, Ok(()));
+    receive(&mut lazy).await;
 
     let urgent = Outgoing {
         priority: Priority::SafetyCritical,
@@ -243,7 +247,7 @@ async fn a_component_that_does_not_read_stops_nobody_and_keeps_the_urgent() {
     let counters = lazy.counters();
     assert_eq!(
         (counters.delivered, counters.dropped, counters.waiting),
-        (101, 91, 10)
+        (102, 91, 10)
     );
     assert_eq!(lazy.try_recv().unwrap().payload, QUERY_HEARTBEAT);
     assert_eq!(lazy.try_recv().unwrap().payload[..], [0x02, 0x42, 91]);

@@ -78,7 +78,7 @@ impl Stack {
         }
     }
 
-    fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(&self) -> bool {
         self.services.iter().any(|service| service.is_moving())
     }
 
