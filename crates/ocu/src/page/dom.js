@@ -56,6 +56,12 @@ export function plain(value, limit = 120) {
 /** A number from the network, or null. */
 export const number = (value) => (typeof value === "number" && Number.isFinite(value) ? value : null);
 
+/** Farther from the origin, in metres, no vehicle drives. Much farther, numbers lose their whole metres. */
+const FARTHEST = 1_000_000;
+
+/** A coordinate from the network in metres, or null. */
+export const metres = (value) => (Math.abs(number(value) ?? Infinity) <= FARTHEST ? value : null);
+
 /** A list from the network, at most `limit` entries of it. */
 export const list = (value, limit = 1000) => (Array.isArray(value) ? value.slice(0, limit) : []);
 

@@ -2,7 +2,7 @@
 // canvas that is moved by one finger, zoomed by two, and tapped to choose a destination. X of the local frame is up, Y right.
 
 import { BaseMap, degreesOf } from "./basemap.js";
-import { figure, get, list, mark, number, say, show } from "./dom.js";
+import { figure, get, list, mark, metres, number, say, show } from "./dom.js";
 import { Overlay, paintScan, paintZones } from "./overlay.js";
 import { Painter } from "./painter.js";
 import { Raster } from "./raster.js";
@@ -59,7 +59,7 @@ export class MapView {
       this.#chosen = false;
     }
     this.#base.update(vehicle?.place, token);
-    const isKnown = (pose) => number(pose?.x) !== null && number(pose?.y) !== null;
+    const isKnown = (pose) => metres(pose?.x) !== null && metres(pose?.y) !== null;
     // Without a local pose, the global one has the frame for itself.
     const pose = isKnown(vehicle?.pose) ? vehicle.pose : vehicle?.place?.fix;
     const known = isKnown(pose);
@@ -67,10 +67,10 @@ export class MapView {
     this.#poseFresh = live && known && pose.age_ms < 1_000;
     if (known) this.#extendTrail(pose);
     const mission = state.mission;
-    this.#path = list(mission?.path).filter((p) => number(p?.[0]) !== null && number(p?.[1]) !== null);
+    this.#path = list(mission?.path).filter((p) => metres(p?.[0]) !== null && metres(p?.[1]) !== null);
     this.#over = ["failed", "stopped", "idle"].includes(mission?.stage);
     const [x, y] = list(mission?.destination);
-    const isGiven = mission?.stage !== "idle" && number(x) !== null && number(y) !== null;
+    const isGiven = mission?.stage !== "idle" && metres(x) !== null && metres(y) !== null;
     this.#destination = isGiven ? { x, y } : null;
     this.#raster.update(state.map, token, () => this.#draw());
     this.#overlay.update(state, live, token, () => this.#draw());

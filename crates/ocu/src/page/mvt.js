@@ -15,14 +15,19 @@ const ORDER = KINDS.map(([kind]) => kind);
 /** Widths of lines in pixels. */
 const WIDTHS = { road: 3, water: 2 };
 const MOST_POINTS = 1_000_000;
+/** Layers and features cost more than their few octets. */
+const MOST_LAYERS = 64;
+const MOST_FEATURES = 100_000;
 const DEFAULT_EXTENT = 4096;
 
 /** What a tile draws: for each layer its kind, extent, areas and lines. */
 export function decode(octets) {
-  const budget = { points: MOST_POINTS };
+  const budget = { points: MOST_POINTS, features: MOST_FEATURES };
   const layers = [];
   for (const { number, value } of fields(new Octets(octets))) {
-    if (number === 3 && value instanceof Octets) layers.push(layer(value, budget));
+    if (number !== 3 || !(value instanceof Octets)) continue;
+    if (layers.length === MOST_LAYERS) throw new Error(`more than ${MOST_LAYERS} layers`);
+    layers.push(layer(value, budget));
   }
   return layers.sort((one, other) => ORDER.indexOf(one.kind) - ORDER.indexOf(other.kind));
 }
@@ -51,7 +56,10 @@ function layer(octets, budget) {
   const features = [];
   for (const { number, value } of fields(octets)) {
     if (number === 1 && value instanceof Octets) name = value.text();
-    if (number === 2 && value instanceof Octets) features.push(value);
+    if (number === 2 && value instanceof Octets) {
+      if ((budget.features -= 1) < 0) throw new Error(`more than ${MOST_FEATURES} features`);
+      features.push(value);
+    }
     if (number === 5 && value > 0) extent = value;
   }
   const [areas, lines] = [new Path2D(), new Path2D()];
@@ -76,12 +84,12 @@ function trace(octets, path, budget) {
   while (!octets.done) {
     const command = octets.number();
     const [what, count] = [command % 8, Math.floor(command / 8)];
+    if (![1, 2, 7].includes(what)) throw new Error(`unknown command ${what} in a geometry`);
+    if ((budget.points -= Math.max(count, 1)) < 0) throw new Error(`more than ${MOST_POINTS} points`);
     if (what === 7) {
       path.closePath();
       continue;
     }
-    if (what !== 1 && what !== 2) throw new Error(`unknown command ${what} in a geometry`);
-    if ((budget.points -= count) < 0) throw new Error(`more than ${MOST_POINTS} points`);
     for (let index = 0; index < count; index++) {
       x += step(octets.number());
       y += step(octets.number());

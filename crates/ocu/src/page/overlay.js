@@ -1,7 +1,7 @@
 // What lies over the map: operating zones, and what the range sensor sees. Zones are fetched when
 // they have changed, scans at most twice a second.
 
-import { get, list, number, plain, say, show } from "./dom.js";
+import { get, list, metres, number, plain, say, show } from "./dom.js";
 import { Pull } from "./pull.js";
 
 const PERIOD = 500;
@@ -11,6 +11,8 @@ const GONE = 30_000;
 const MOST_ZONES = 64;
 const MOST_VERTICES = 255;
 const MOST_POINTS = 1_024;
+/** Up to so many pixels the operating zone is dashed: the dashes outside of the screen cost as much as those on it. */
+const LONGEST_DASHED = 20_000;
 
 export class Overlay {
   #pull;
@@ -104,7 +106,7 @@ function problem({ problem: why, omitted_zones: omitted }) {
 
 const points = (value, most) =>
   list(value, most)
-    .filter((point) => number(point?.[0]) !== null && number(point?.[1]) !== null)
+    .filter((point) => metres(point?.[0]) !== null && metres(point?.[1]) !== null)
     .map(([x, y]) => ({ x, y }));
 
 /** Draws zones below the route: the outside of the operating zone and keep-out zones are shaded. */
@@ -119,12 +121,17 @@ export function paintZones(context, { zones }, toScreen, { width, height }, colo
     context.beginPath();
     outline(context, vertices, toScreen);
     context.lineJoin = "round";
-    context.setLineDash(id === 1 ? [10, 6] : []);
+    context.setLineDash(id === 1 && perimeter(vertices, toScreen) < LONGEST_DASHED ? [10, 6] : []);
     context.lineWidth = 2.5;
     context.strokeStyle = colours.zone;
     context.stroke();
     context.setLineDash([]);
   }
+}
+
+function perimeter(vertices, toScreen) {
+  const pixels = vertices.map((vertex) => toScreen(vertex));
+  return pixels.reduce((sum, [x, y], at) => sum + Math.hypot(x - pixels.at(at - 1)[0], y - pixels.at(at - 1)[1]), 0);
 }
 
 function outline(context, vertices, toScreen) {

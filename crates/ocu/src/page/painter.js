@@ -1,5 +1,8 @@
 // Draws the map's own marks on a canvas: grid, lines, pins, the vehicle, the scale and north.
 
+/** Most lines of the grid in one direction: a screen has fewer. */
+const MOST_LINES = 500;
+
 /** A canvas as it is seen now: how places lie on it, and in which colours. */
 export class Painter {
   #context;
@@ -24,11 +27,11 @@ export class Painter {
       context.lineTo(...to);
       context.stroke();
     };
-    for (let index = Math.ceil(bottom.x / step); index * step <= top.x; index++) {
+    for (const index of wholes(bottom.x / step, top.x / step)) {
       const y = Math.round(this.#toScreen({ x: index * step, y: 0 })[1]) + 0.5;
       line(index, [0, y], [width, y]);
     }
-    for (let index = Math.ceil(top.y / step); index * step <= bottom.y; index++) {
+    for (const index of wholes(top.y / step, bottom.y / step)) {
       const x = Math.round(this.#toScreen({ x: 0, y: index * step })[0]) + 0.5;
       line(index, [x, 0], [x, height]);
     }
@@ -149,6 +152,13 @@ export class Painter {
 }
 
 /** The next of 1, 2, 5 times a power of ten. */
+/** The whole numbers from one number to another. */
+function wholes(from, to) {
+  const first = Math.ceil(from);
+  const count = Math.min(Math.max(Math.floor(to) - first + 1, 0), MOST_LINES);
+  return Array.from({ length: count }, (_, index) => first + index);
+}
+
 function roundStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= least * 0.999);

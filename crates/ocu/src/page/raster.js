@@ -1,7 +1,7 @@
 // The raster under the map: fetches the cells of a traversability map when its revision changes,
 // and keeps them as a picture of one pixel per cell.
 
-import { number } from "./dom.js";
+import { metres, number } from "./dom.js";
 
 const LARGEST = 4096;
 const RETRY = 2_000;
@@ -86,7 +86,8 @@ function valid(info) {
   const size = (value) => Number.isInteger(value) && value > 0 && value <= LARGEST;
   return Boolean(
     info && Number.isInteger(info.id) && Number.isInteger(info.revision) && size(info.rows) &&
-      size(info.columns) && number(info.cell_m) > 0 && number(info.x) !== null && number(info.y) !== null,
+      size(info.columns) && metres(info.x) !== null && metres(info.y) !== null && number(info.cell_m) > 0 &&
+      metres(info.cell_m * LARGEST) !== null,
   );
 }
 

@@ -40,3 +40,17 @@ test("zones, obstacles and the scan of a vehicle are drawn", async () => {
   assert.ok(colours.includes("--map-zone"), "the zone's edge");
   assert.equal(colours.filter((colour) => colour === "--map-obstacle").length, 2, "the obstacle and the scan's point");
 });
+
+test("places where no vehicle can be leave the page able to draw, and so to stop", async () => {
+  for (const far of [1e18, -1e300, 1e6 + 1]) {
+    const map = new MapView(() => {}, async () => ({ zones_revision: 1, zones: [{ number: 1, points: [[far, 0], [0, far], [9, 9]] }] }));
+    const info = { id: 1, revision: 1, rows: 1, columns: 1, cell_m: 1, x: far, y: 0 };
+    const vehicle = { subsystem: 101, pose: { x: far, y: 0, yaw: 0, age_ms: 0 }, overlay: { zones: 1, scan: 0 } };
+    const mission = { stage: "driving", path: [[far, 0], [0, 0]], destination: [0, far] };
+    for (const cell_m of [1, Math.abs(far)]) map.update({ vehicle, mission, map: { ...info, cell_m } }, true, "");
+    await new Promise((resolve) => setImmediate(resolve));
+    painted.length = 0;
+    frame();
+    assert.ok(painted.length < 100, `${painted.length} lines for ${far}`);
+  }
+});

@@ -95,3 +95,14 @@ test("hostile answers are bounded and drawn without errors", async () => {
     paintScan(context, shown, () => [0, 0], 24, {});
   }
 });
+
+test("an edge that is far longer than the screen is drawn without dashes", () => {
+  const dashes = [];
+  const context = new Proxy({}, { get: (_, name) => (...values) => name === "setLineDash" && dashes.push(values[0].length) });
+  const zone = (side) => ({ zones: [{ number: 1, points: [{ x: 0, y: 0 }, { x: 0, y: side }, { x: side, y: side }] }] });
+  const paint = (side) => paintZones(context, zone(side), ({ x, y }) => [y, x], { width: 300, height: 200 }, {});
+  paint(100);
+  assert.deepEqual(dashes.splice(0), [2, 0]);
+  paint(1_000_000);
+  assert.deepEqual(dashes.splice(0), [0, 0]);
+});
