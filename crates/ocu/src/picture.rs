@@ -15,7 +15,7 @@ use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, Report};
 use super::role::Role;
 use super::state;
-use super::stop_monitor::StopMonitor;
+use super::stop_monitor::{StopMonitor, speed};
 use jaus::address::JausId;
 use jaus::service::{ComponentEntry, Directory, SampleAge, State};
 use jaus_vehicle::messages::handoff::enhanced_access_control;
@@ -234,14 +234,9 @@ impl Picture {
             }
             Report::Velocity(what, sampled) => {
                 part.velocity_age.handle(now, sampled.stamp());
-                let at = sample_time(now, by, &part.velocity_age, self.velocity.as_ref());
-                // An inertial measurement unit reports turn rates without a speed.
-                let source = self.velocity.map(|known| known.by);
-                if what.x.is_some() || source.is_none_or(|source| source == by) {
-                    self.velocity = Some(Sample { what, by, at });
-                    let emergency = self.in_emergency().next().is_some();
-                    self.stop_monitor.handle_velocity(now, &what, emergency);
-                }
+                let at = sample_time(now, by, &part.velocity_age, part.velocity.as_ref());
+                part.velocity = Some(Sample { what, by, at });
+                self.handle_velocities(now);
             }
             Report::Mission(what) => self.handle_mission(now, by, what),
             Report::Path(path) => self.path = path,
@@ -256,6 +251,31 @@ impl Picture {
                 self.overlay.handle_scan(now, pose, scan.as_ref());
             }
             Report::Subscription { .. } => {}
+        }
+    }
+
+    /// Takes the velocity of the vehicle from those that its parts report: the greatest of the fresh ones, because no
+    /// source may hide that another one measures motion. An inertial measurement unit reports turn rates without a
+    /// speed, which count only where no part reports one.
+    fn handle_velocities(&mut self, now: Instant) {
+        let limit = self.depth.velocity_counts();
+        let reported = self.parts.values().filter_map(|part| part.velocity);
+        let greatest = reported.max_by(|one, other| {
+            let rank = |it: &Sample<state::Velocity>| {
+                let is_fresh = is_within(now, it, limit);
+                let age = now.saturating_duration_since(it.at).as_secs_f64();
+                let speed = speed(&it.what).filter(|_| is_fresh).unwrap_or(-age);
+                (it.what.x.is_some(), is_fresh, speed)
+            };
+            let (one, other) = (rank(one), rank(other));
+            let is_better = (one.0, one.1).cmp(&(other.0, other.1));
+            is_better.then(one.2.total_cmp(&other.2))
+        });
+        if let Some(velocity) = greatest {
+            self.velocity = Some(velocity);
+            let emergency = self.in_emergency().next().is_some();
+            let what = &velocity.what;
+            self.stop_monitor.handle_velocity(now, what, emergency);
         }
     }
 

@@ -56,7 +56,7 @@ impl StopMonitor {
 }
 
 /// The fastest motion of the vehicle's outline, in metres per second.
-fn speed(velocity: &Velocity) -> Option<f64> {
+pub(super) fn speed(velocity: &Velocity) -> Option<f64> {
     let turning = velocity.yaw_rate.unwrap_or(0.0).abs() * StopMonitor::ARM;
     velocity.x.map(|x| x.abs().max(turning))
 }

@@ -60,6 +60,7 @@ pub(crate) struct Part {
     pub(super) reports_velocity: bool,
     pub(super) pose_age: SampleAge,
     pub(super) velocity_age: SampleAge,
+    pub(super) velocity: Option<Sample<state::Velocity>>,
     /// Time of its last report.
     pub(super) heard: Option<Instant>,
     /// Whether the last subscription event was a loss of reports.
@@ -86,6 +87,7 @@ impl Part {
             reports_velocity: false,
             pose_age: SampleAge::default(),
             velocity_age: SampleAge::default(),
+            velocity: None,
             heard: None,
             is_down: false,
             has_answered_stop: false,
@@ -112,6 +114,7 @@ impl Part {
         (self.status, self.controller, self.stage) = (None, None, None);
         self.pose_age.forget();
         self.velocity_age.forget();
+        self.velocity = None;
         (self.heard, self.is_down) = (None, false);
     }
 

@@ -380,6 +380,34 @@ fn shown(picture: &Picture, now: Instant) -> state::VehicleState {
 }
 
 #[test]
+fn no_source_of_velocities_hides_that_another_one_measures_motion() {
+    let start = Instant::now();
+    let other_id = JausId::new(101, 7, 42);
+    let other = component(other_id, &[velocity_state_sensor::URN]);
+    let mut picture = picture(start, &[driver(), sensors(), other]);
+    let emergency = || ReportStatus {
+        status: (State::Emergency as u8).into(),
+        ..ReportStatus::default()
+    };
+    for step in 0..60 {
+        let now = start + ms(40 * step);
+        picture.handle_report(now, DRIVER, emergency().into());
+        if step % 5 == 0 {
+            picture.handle_report(now, SENSORS, moving(1.0).into());
+        }
+        picture.handle_report(now, other_id, moving(0.0).into());
+        assert_eq!(shown(&picture, now).at_rest, Some(false), "{step}");
+    }
+    let end = start + ms(40 * 59);
+    assert!(shown(&picture, end).runaway);
+    // The only source that is left counts.
+    let later = end + ms(1200);
+    picture.handle_report(later, DRIVER, emergency().into());
+    picture.handle_report(later, other_id, moving(0.0).into());
+    assert_eq!(shown(&picture, later).at_rest, Some(true));
+}
+
+#[test]
 fn an_emergency_does_not_count_as_a_stop_before_the_speed_is_measured() {
     let start = Instant::now();
     let mut picture = picture(start, &[driver(), sensors()]);
