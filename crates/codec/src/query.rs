@@ -31,7 +31,7 @@ pub struct Echo {
 }
 
 impl Echo {
-    /// Whether a report may answer a query: it says nothing else.
+    /// Whether a report may answer a query: it says nothing else, or the query asks for whatever there is.
     #[must_use]
     pub fn is_in(self, query: &[u8], report: &[u8]) -> bool {
         let number = |place: usize| place..place.saturating_add(self.octets);
@@ -39,6 +39,12 @@ impl Echo {
             query.get(number(self.query)),
             report.get(number(self.report)),
         ) {
+            // In many queries 0 or the greatest number stands for whatever there is.
+            (Some(asked), Some(_))
+                if [0, 0xFF].iter().any(|all| asked.iter().all(|it| it == all)) =>
+            {
+                true
+            }
             (Some(asked), Some(told)) => asked == told,
             // It is malformed, which its reader notices.
             _ => true,

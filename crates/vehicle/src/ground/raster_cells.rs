@@ -39,18 +39,18 @@ pub async fn fetch_cells(
             map,
             row,
             column: 0,
-            rows: step.min(edition.rows - row),
-            columns,
+            maximum_rows: step.min(edition.rows - row),
+            maximum_columns: columns,
         };
         let block = component.query(store, &query).await?;
         let is_asked = (block.map, block.row, block.rows, block.columns)
-            == (query.map, query.row, query.rows, query.columns);
-        let is_full = block.cells.len() == usize::from(query.rows) * width;
+            == (query.map, query.row, query.maximum_rows, columns);
+        let is_full = block.cells.len() == usize::from(block.rows) * width;
         if !is_asked || !is_full || block.revision != edition.revision {
             return Ok(None);
         }
         cells.extend_from_slice(&block.cells);
-        row += query.rows;
+        row += query.maximum_rows;
     }
     Ok(Some(cells))
 }

@@ -51,8 +51,8 @@ impl RasterMaps {
         let asked = Window {
             row: query.row,
             column: query.column,
-            rows: query.rows,
-            columns: query.columns,
+            rows: query.maximum_rows,
+            columns: query.maximum_columns,
         };
         let report = self.store.read(|world| {
             let none = ReportRasterCells {
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(cells(&mut rig, &all_of(2)), (0, 0, vec![]));
         let outside = QueryRasterCells {
             row: 1,
-            rows: 2,
+            maximum_rows: 2,
             ..all_of(1)
         };
         assert_eq!(cells(&mut rig, &outside), (0, 0, vec![]));

@@ -35,7 +35,7 @@ pub struct Planner {
     pub mission: Settings,
     /// Name of the map to plan on. A single map is used whatever its name.
     pub map: String,
-    /// The authority used to control the path segment driver, from 0 to 255.
+    /// The authority used to control the path segment driver, from 0 to 255, where the client has no less.
     pub authority: u8,
     /// The minimum authority of a client to control the planner.
     pub least_authority: u8,

@@ -1,5 +1,6 @@
 //! What a vehicle under way drives by is changed by the client at the head of the chain of its drivers
-//! alone: not by one of a higher authority, nor by one that had a sensor or the store before.
+//! alone: not by one of a higher authority, nor by one that had a sensor or the store before. And a client gets
+//! no more authority over a driver by the stage before it than it has.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
@@ -9,17 +10,18 @@
 
 use std::time::Duration;
 
+use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::Control;
 use jaus::messages::core::set_time::TimeStamp;
-use jaus::messages::core::{QueryTime, ReportTime, SetTime};
+use jaus::messages::core::{QueryControl, QueryTime, ReportTime, SetTime};
 use jaus::messages::mobility::delete_zone::ZoneIdRec;
 use jaus::messages::mobility::set_global_operating_zone::{
     GlobalExclusionZoneRec, GlobalExclusionZoneSeq, GlobalPolygonPointRec, Latitude, Longitude,
 };
 use jaus::messages::mobility::{
     DeleteZone, QueryLocalOperatingZone, ReportLocalOperatingZone, SetGlobalOperatingZone,
-    delete_zone,
+    SetLocalVector, delete_zone,
 };
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::report_raster_change::Result_ as ChangeResult;
@@ -31,7 +33,8 @@ use tokio::time::sleep;
 
 use crate::beliefs::{Stranger, driving, pose, until_stage};
 use crate::mission::zones::{keep_out, square};
-use crate::scene::{POSE, STORE, Scene};
+use crate::scene::{POSE, PRIMITIVE, STORE, Scene, VECTOR};
+use crate::whole_vehicle::WholeVehicle;
 
 /// A number of a keep-out zone far from everything.
 const ZONE: u16 = 7;
@@ -187,5 +190,42 @@ async fn a_client_of_the_highest_authority_that_is_not_the_head_of_the_chain_cha
     assert_eq!(zones(&vehicle).await, before);
     assert_eq!(map(&vehicle).await, (number, cells));
     until_stage(&vehicle, Stage::ARRIVED).await;
+    vehicle.end().await;
+}
+
+/// Drives for 3 s by the vector driver, with this authority of a stranger. Returns who controls the motors then.
+async fn controller_of_the_motors(vehicle: &WholeVehicle, authority: u8) -> (JausId, u8) {
+    let stranger = Stranger::new(vehicle);
+    let client = &stranger.client;
+    let take = || async move { client.control(VECTOR, authority).await.ok() };
+    let vector_driver = vehicle.until("control", take).await;
+    vector_driver.resume().await.unwrap();
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(0.5).unwrap();
+    for _ in 0..30 {
+        vector_driver.send(&vector).unwrap();
+        sleep(Duration::from_millis(100)).await;
+    }
+    let told = vehicle.client.query(PRIMITIVE, &QueryControl {}).await;
+    let told = told.unwrap();
+    vector_driver.release().await;
+    (
+        JausId::new(told.subsystem_id, told.node_id, told.component_id),
+        told.authority_code,
+    )
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_client_gets_no_more_authority_over_the_motors_by_the_stage_before_them() {
+    let vehicle = WholeVehicle::start("lent-authority", None);
+    for (authority, lent) in [(1, 1), (50, 50), (255, 100)] {
+        let free = controller_of_the_motors(&vehicle, authority).await;
+        assert_eq!(free, (VECTOR, lent));
+        sleep(Duration::from_secs(2)).await;
+    }
+    let take = || async { vehicle.client.control(PRIMITIVE, 50).await.ok() };
+    let _operator = vehicle.until("control", take).await;
+    let held = controller_of_the_motors(&vehicle, 1).await;
+    assert_eq!(held, (vehicle.client.id(), 50), "the guest has 1");
     vehicle.end().await;
 }

@@ -17,4 +17,4 @@ pub(super) use global_poses::GlobalPoses;
 pub(super) use next::{Language, Next};
 pub(super) use remote_platform::{Order, RemotePlatform, RemotePlatformSettings};
 pub(super) use senses::{Sense, reported_pose};
-pub(super) use standing::{Watchman, guard, shut_down};
+pub(super) use standing::{Watchman, guard, lent_authority, shut_down};

@@ -19,7 +19,7 @@ use tokio::sync::watch;
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
 use super::remote_platform::{Order, Plan, RemotePlatform};
-use super::{FaultMonitor, Watchman};
+use super::{FaultMonitor, Watchman, lent_authority};
 use crate::ground::{StageBoard, StageReport, StageState};
 use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
@@ -63,7 +63,7 @@ pub(in crate::parts) struct Next<L> {
     pub(in crate::parts) fence: Fence,
     pub(in crate::parts) board: StageBoard,
     pub(in crate::parts) language: L,
-    /// The authority used to control the next driver.
+    /// The authority used to control the next driver, where the client has no less.
     pub(in crate::parts) authority: u8,
     /// After standing down, the driver accepts commands again once its clients have been silent for
     /// this time.
@@ -181,13 +181,14 @@ impl<L: Language> Next<L> {
         ticks: &mut Interval,
         watchman: &mut Watchman,
     ) -> Result<Option<Down>, PartError> {
-        let settings = SessionSettings::new(self.authority).retake(Retake::WhenFree);
+        let authority = lent_authority(&self.component.standing(), self.authority);
+        let settings = SessionSettings::new(authority).retake(Retake::WhenFree);
         let session = self.component.session(self.providers(), settings).await;
         let session = session.map_err(|_| PartError::NodeStopped)?;
         let component = self.component.clone();
         let answered = watch::Sender::new(now());
         let end = tokio::select! {
-            end = self.command(&session, &answered, ticks, watchman) => end,
+            end = self.command((&session, authority), &answered, ticks, watchman) => end,
             never = note_answers(&component, &session, &answered, Self::PULSE) => match never {},
             why = stood_down(&component, &session) => Some(why),
         };
@@ -200,10 +201,11 @@ impl<L: Language> Next<L> {
         Audience::providers(L::URN).in_subsystem(self.component.id().subsystem())
     }
 
-    /// Commands the next driver whenever it is ready, until there is no more work.
+    /// Commands the next driver whenever it is ready, until there is no more work, or the client in control has
+    /// another authority.
     async fn command(
         &mut self,
-        session: &Session,
+        (session, authority): (&Session, u8),
         answered: &watch::Sender<Instant>,
         ticks: &mut Interval,
         watchman: &mut Watchman,
@@ -212,7 +214,13 @@ impl<L: Language> Next<L> {
         let mut had_control = false;
         let mut moved_at = None;
         loop {
-            watchman.note(self.component.standing());
+            let standing = self.component.standing();
+            watchman.note(standing);
+            if standing.controller.is_some()
+                && lent_authority(&standing, self.authority) != authority
+            {
+                return None;
+            }
             let (start, state) = (now(), session.state());
             let plan = self.remote_platform.plan(start);
             if plan != Plan::Rest {

@@ -11,6 +11,12 @@ pub(in crate::parts) fn guard(control_timeout: u8) -> Management {
     Management::new().access_control(AccessControl::new().timeout(control_timeout))
 }
 
+/// The authority with which a stage controls the next one: its own, and not more than its client has.
+pub(in crate::parts) fn lent_authority(standing: &Standing, own: u8) -> u8 {
+    let client = standing.controller.map_or(own, |it| it.authority);
+    client.min(own)
+}
+
 /// Waits until a client has shut the component down. Its program then ends.
 pub(in crate::parts) async fn shut_down(component: &Component) -> Result<Infallible, PartError> {
     let mut standings = component.watch_standing();

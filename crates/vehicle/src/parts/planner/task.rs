@@ -22,6 +22,7 @@ use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage, Terrain,
 };
 use crate::parts::Telemetry;
+use crate::parts::drivers::lent_authority;
 use crate::sensing::Lookout;
 use crate::zones::Zones;
 use jaus::address::JausId;
@@ -256,6 +257,7 @@ impl<'a> PlannerTask<'a> {
             let given = async {
                 let drivers = chain::drivers(Link::Path, component.id().subsystem());
                 let driver = find_soon(&component, drivers, "local path segment driver").await?;
+                let authority = lent_authority(&component.standing(), authority);
                 let session = engage(&component, driver, authority).await?;
                 hand_over::hand_over(&component, &session, &path, speed, tolerance).await?;
                 Ok((session, look(&component).await))
