@@ -92,7 +92,7 @@ fn what_it_has_told_is_there_after_a_kill_and_the_next_start() {
     let cells = ask(
         &network,
         "QueryRasterCells",
-        &json!({"Map": 1, "Row": 0, "Column": 0, "Rows": 0, "Columns": 0}),
+        &json!({"Map": 1, "Row": 0, "Column": 0, "MaximumRows": 0, "MaximumColumns": 0}),
     );
     assert_eq!(
         (&cells["Rows"], &cells["Columns"]),

@@ -311,16 +311,16 @@ pub(crate) fn store(node: &Node, cells: Arc<Mutex<Vec<u8>>>) -> Component {
         .answer(move |query: QueryRasterCells| {
             let cells = cells.lock().unwrap();
             let side = usize::from(SIDE);
-            let rows = usize::from(query.row)..usize::from(query.row + query.rows);
-            let tile =
-                rows.flat_map(|row| cells[row * side..][..usize::from(query.columns)].to_vec());
+            let rows = usize::from(query.row)..usize::from(query.row + query.maximum_rows);
+            let tile = rows
+                .flat_map(|row| cells[row * side..][..usize::from(query.maximum_columns)].to_vec());
             ReportRasterCells {
                 map: query.map,
                 revision: 0,
                 row: query.row,
                 column: query.column,
-                rows: query.rows,
-                columns: query.columns,
+                rows: query.maximum_rows,
+                columns: query.maximum_columns,
                 cells: tile.collect::<Vec<u8>>().into(),
             }
         });
