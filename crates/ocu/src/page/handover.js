@@ -34,13 +34,18 @@ export class Handover {
     if (!known) this.#since = this.#now();
     this.#request = request ? { part: plain(request.part, 16), operator: plain(request.operator, 16) } : null;
     show(get("handover"), operable && this.#request !== null);
+    for (const id of ["handover-yes", "handover-no"]) get(id).disabled = this.#isUnread;
     if (this.#request === null) return;
     const why = plain(request.explanation, 120);
     say(get("handover-text"), `${this.#request.operator} requests control (authority ${request.authority})${why ? `: ${why}` : ""}`);
   }
 
+  get #isUnread() {
+    return this.#now() - this.#since < UNREAD;
+  }
+
   #answer(grant) {
-    if (this.#request === null || this.#now() - this.#since < UNREAD) return;
+    if (this.#request === null || this.#isUnread) return;
     this.#ask({ type: "handover", ...this.#request, grant });
   }
 }

@@ -31,9 +31,12 @@ test("a click that was meant for the request before answers no other one", () =>
   it.now = 2_000;
   it.handover.update(state("60.1.9"), true);
   it.now = 2_500;
+  assert.ok(get("handover-yes").disabled);
   get("handover-yes").click();
   assert.deepEqual(it.asked, []);
   it.now = 3_000;
+  it.handover.update(state("60.1.9"), true);
+  assert.ok(!get("handover-no").disabled);
   get("handover-no").click();
   assert.deepEqual(it.asked, ["60.1.9"]);
 });

@@ -41,12 +41,14 @@ pub(crate) fn run() {
     is_announced(&mut first, "43.1.1 requests control");
     look_from_all_screens(&mut first, "handover-request");
     look_from_all_screens(&mut second, "handover-asking");
+    first.wait("!document.querySelector('#handover-no').disabled");
     first.press("#handover-no");
     second.wait("document.querySelector('#toasts').textContent.includes('refused')");
     is_announced(&mut second, "refused");
     second.wait("document.body.dataset.control === 'none'");
 
     ask(&mut second, &mut first);
+    first.wait("!document.querySelector('#handover-yes').disabled");
     first.press("#handover-yes");
     second.wait("document.body.dataset.control === 'held'");
     first.wait("document.body.dataset.control === 'none'");
