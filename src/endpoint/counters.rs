@@ -45,8 +45,8 @@ counters! {
     Duplicate = "dropped: duplicate",
     /// Dropped: a message from an id that `access.bind` binds to other networks.
     BoundElsewhere = "dropped: id bound to another network",
-    /// Dropped: a message from an id of a peer of the secure link by another link, or from a guest of a bridge
-    /// with the id of a component of this side.
+    /// Dropped: a message from an id of a peer of the secure link by another link, or from the other side of a
+    /// bridge with the id of a component of this side.
     ReservedId = "dropped: id of another link",
     /// Dropped: a message to which `access.grants` gives its sender no right.
     NotGranted = "dropped: sender has no right to it",

@@ -29,7 +29,7 @@ pub struct LinkProfile {
     pub reads_one: bool,
     /// Of a bridge: what the components of its other side may do. Ids that no grant there names and gives
     /// rights ([`Acceptance::trusts`]) give way to components on other links.
-    pub guests: Option<Acceptance>,
+    pub bridged: Option<Acceptance>,
 }
 
 impl LinkProfile {

@@ -35,6 +35,7 @@
 mod access;
 mod acknowledge;
 mod arrival;
+mod bridged;
 mod config;
 mod counters;
 mod decided;
@@ -43,7 +44,6 @@ mod duplicates;
 mod egress;
 mod event;
 mod forward;
-mod guests;
 mod large;
 mod link;
 mod peers;
@@ -65,6 +65,7 @@ use std::time::Instant;
 
 pub use crate::peer::Pacing;
 pub use access::{Access, AccessEntry, AccessError, Binding, Network, Subsystems};
+pub use bridged::ID_HELD;
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use decided::Decided;
@@ -74,7 +75,6 @@ pub(crate) use egress::MOST_OCTETS;
 pub use egress::Packing;
 pub use event::{AttachError, Event, MessageHandle, Outgoing, Received, Shortfall, Unacknowledged};
 pub use forward::Routing;
-pub use guests::ID_HELD;
 pub use link::{LinkId, LinkProfile, Path, Remote, SessionId, To, Transmit};
 pub use peers::{Peer, RouteState, Traffic};
 

@@ -147,7 +147,7 @@ impl Endpoint {
         let seen = self.heard.fingerprint(frame);
         self.refuse_own(arrival, seen)?;
         self.refuse_misplaced(arrival)?;
-        self.refuse_guest(arrival)?;
+        self.refuse_bridged(arrival)?;
         let passes = self.is_passed_on(frame);
         let is_for_us = match self.check_receivers(frame, broadcast) {
             Err(_) if passes => false,
@@ -204,8 +204,8 @@ impl Endpoint {
             }
             return Err(Counter::Duplicate);
         }
-        // A copy of a guest's own message, from another bridge or a router, shows no component.
-        self.dismiss_guest(arrival);
+        // A copy of a bridge's own message, from another bridge or a router, shows no component.
+        self.forget_bridged(arrival);
         if passes && self.is_astray(arrival) {
             self.counters.add(Counter::NotTheWayBack);
         } else {

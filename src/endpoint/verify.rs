@@ -38,7 +38,7 @@ pub(super) enum Warning {
     NotGranted,
     OwnNotGranted,
     Reserved,
-    Guest,
+    Bridged,
     Unverified,
 }
 

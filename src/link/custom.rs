@@ -30,8 +30,8 @@ pub trait CustomLink: fmt::Debug + Send {
     }
 
     /// Of a bridge, what the components of its other side may do: see
-    /// [`LinkProfile::guests`](crate::endpoint::LinkProfile::guests).
-    fn guests(&self) -> Option<Acceptance> {
+    /// [`LinkProfile::bridged`](crate::endpoint::LinkProfile::bridged).
+    fn bridged(&self) -> Option<Acceptance> {
         None
     }
 

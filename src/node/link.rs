@@ -44,7 +44,7 @@ impl Link {
                 ..LinkProfile::judp([])
             },
             Self::Custom(link) => LinkProfile {
-                guests: link.guests(),
+                bridged: link.bridged(),
                 ..LinkProfile::default()
             },
             _ => LinkProfile {

@@ -100,11 +100,14 @@ impl<'a> Context<'a> {
         message: &Received,
         validity: Validity,
     ) -> bool {
-        if validity != Validity::UntilDone && self.life.is_late(message) {
+        if validity == Validity::UntilDone {
+            return self.order.admits(now, message, validity);
+        }
+        if self.life.is_late(message) {
             self.order.refuse(message, "it was held up");
             return false;
         }
-        if validity != Validity::UntilDone && !self.life.is_fresh(now, message.source) {
+        if !self.life.is_fresh(now, message.source) {
             self.order.refuse(message, "it may be too old");
             self.news.late = Some(message.source);
             return false;

@@ -192,10 +192,13 @@ impl Life {
         };
         peer.alive = now;
         peer.probes = 0;
-        if let Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE) = code_of(payload) {
+        let code = code_of(payload);
+        if let Some(ReportHeartbeatPulse::CODE | ReportIncarnation::CODE) = code {
             (peer.answers, peer.unanswered) = (true, 0);
         }
-        if let Ok(report) = ReportIncarnation::decode(payload) {
+        if code == Some(ReportIncarnation::CODE)
+            && let Ok(report) = ReportIncarnation::decode(payload)
+        {
             let number = number_of(message);
             peer.freshness.note(now, report.stamp, number);
         }
@@ -209,7 +212,8 @@ impl Life {
                 self.due.insert((now, id));
             }
             Sameness::Restarted => {
-                peer.freshness = Freshness::default();
+                // The new one is asked from its beginning.
+                (peer.freshness, peer.is_checked) = (Freshness::default(), false);
                 self.restarted.push_back(id);
             }
         }

@@ -132,7 +132,7 @@ impl Station {
             )));
         }
         let generates_token = self.token.is_none() && self.users.is_none() && !self.unprotected;
-        // Whoever has the usual port may wait there for the kept token.
+        // Another program has the usual port, and may wait there for the kept token.
         let folder = self.state.as_ref().filter(|_| generates_token && !is_moved);
         let token_file = folder.map(|it| it.join(TOKEN_FILE));
         if generates_token {

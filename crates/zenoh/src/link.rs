@@ -139,7 +139,7 @@ impl CustomLink for ZenohLink {
         self.shared.lock().exchange.counters().counts().collect()
     }
 
-    fn guests(&self) -> Option<Acceptance> {
+    fn bridged(&self) -> Option<Acceptance> {
         Some(self.shared.lock().exchange.accept().clone())
     }
 

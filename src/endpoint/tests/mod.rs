@@ -4,13 +4,13 @@
 mod acknowledgements;
 mod anything;
 mod bounds;
+mod bridged;
 mod budget;
 mod cancelling;
 mod delivery;
 mod duplicates;
 mod flood;
 mod fragments;
-mod guests;
 mod hosts;
 mod identity;
 mod junior;

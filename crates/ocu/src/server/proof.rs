@@ -1,10 +1,10 @@
-//! Proofs that a page and this station know the same secret. The secret itself is not sent: whoever has the port gets
-//! what a page sends, and another user of the host can take the port while the station restarts.
+//! Proofs that a page and this station know the same secret. The secret itself is not sent, because
+//! another user of the host can take the port while the station restarts, and gets what a page sends then.
 //!
 //! Of the secret a page keeps a key for the host and port by which it was opened. The key makes a *ticket* for this run
 //! of the station, which the page shows instead of the secret, and the *answer* to a nonce of the page, by which the page
-//! knows the station. Neither counts at another host, at another port or in another run. The page speaks first: a
-//! station that answered anybody would let anybody guess a weak token without being noticed.
+//! knows the station. Neither counts at another host, at another port or in another run. The page speaks first: if
+//! the station answered every page, a weak token could be guessed without being noticed.
 
 use hmac::{Hmac, Mac as _};
 use sha2::Sha256;

@@ -61,7 +61,7 @@ async fn page_and_station_prove_that_they_know_the_token() {
     assert!(head.starts_with("HTTP/1.1 200"), "{head}");
 }
 
-/// Whoever has the port for a moment gets a ticket for a run of its own, or one that was.
+/// A program that takes the port for a moment gets a ticket for a run of its own, or for an earlier one.
 #[tokio::test]
 async fn a_ticket_of_another_run_or_port_is_worth_nothing_and_learns_nothing() {
     let scene = guarded().await;

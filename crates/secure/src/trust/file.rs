@@ -55,7 +55,7 @@ impl TrustFile {
     }
 
     /// Reads a trust file, which may be missing as long as there is nothing to say: one that was there and
-    /// vanishes may have narrowed somebody, and is unusable.
+    /// vanishes may have narrowed the rights of a certificate, and is unusable.
     ///
     /// # Errors
     /// As [`load`](Self::load).

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
-use super::restarts::{OLD, moving};
+use super::restarts::{NEW, OLD, moving};
 use super::*;
 use crate::messages::core::{DeleteElement, QueryIncarnation, ReportIncarnation, Resume, Standby};
 
@@ -105,4 +105,19 @@ fn a_client_whose_messages_take_another_way_with_a_counter_of_its_own_goes_on() 
         assert_eq!(commands.load(Relaxed), before + 1, "{first}");
         rig.go_on_for(8);
     }
+}
+
+#[test]
+fn a_client_that_has_restarted_must_echo_stamps_of_its_own() {
+    let (mut rig, commands) = moving();
+    rig.introduce(FIRST, NEW);
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    assert_eq!(rig.state(), State::Ready);
+    let before = commands.load(Relaxed);
+    rig.hear(FIRST, &DeleteElement::default());
+    assert_eq!(commands.load(Relaxed), before + 1);
+    rig.stamps_for(ms(1200));
+    rig.hear(FIRST, &DeleteElement::default());
+    assert_eq!(commands.load(Relaxed), before + 1, "it has echoed none");
 }

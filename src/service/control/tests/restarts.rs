@@ -15,11 +15,11 @@ use crate::service::{
 
 /// The numbers of two starts of a client.
 pub(super) const OLD: u64 = 7;
-const NEW: u64 = 8;
+pub(super) const NEW: u64 = 8;
 
 impl Rig {
     /// The client tells its incarnation, as it does before it requests control.
-    fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
+    pub(super) fn introduce(&mut self, client: JausId, incarnation: u64) -> Vec<Sent> {
         let query = QueryIncarnation {
             sender_incarnation: incarnation,
             stamp: 0,

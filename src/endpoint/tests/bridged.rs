@@ -1,4 +1,4 @@
-//! Ids of the guests of a bridge that components of this side have, too.
+//! Ids of the other side of a bridge that components of this side have, too.
 
 use super::*;
 use crate::rights::Acceptance;
@@ -20,7 +20,7 @@ fn numbered(sequence: u16) -> Frame {
 }
 
 /// A rig with a plain link and a bridge whose other side has these rights; the peer is there, and has answered.
-fn with_guest(accept: Acceptance) -> Rig {
+fn with_bridge(accept: Acceptance) -> Rig {
     let mut rig = Rig::with(Config {
         routing: Routing {
             forward: true,
@@ -29,7 +29,7 @@ fn with_guest(accept: Acceptance) -> Rig {
         ..Config::default()
     });
     let profile = LinkProfile {
-        guests: Some(accept),
+        bridged: Some(accept),
         ..LinkProfile::default()
     };
     rig.endpoint.add_link(BRIDGE, profile);
@@ -46,8 +46,8 @@ fn hear_abroad(rig: &mut Rig, sequence: u16) {
 }
 
 #[test]
-fn a_guest_that_may_only_look_gives_its_id_up_to_the_component_of_this_side_at_once() {
-    let mut rig = with_guest(Acceptance::default());
+fn a_bridged_id_that_may_only_look_goes_to_the_component_of_this_side_at_once() {
+    let mut rig = with_bridge(Acceptance::default());
     rig.hear(&numbered(500));
     assert_eq!(rig.received().len(), 1);
     let moved = Event::PeerMoved {
@@ -70,8 +70,8 @@ fn a_guest_that_may_only_look_gives_its_id_up_to_the_component_of_this_side_at_o
 }
 
 #[test]
-fn a_broadcast_by_which_a_component_appears_is_passed_on_though_a_guest_has_its_id() {
-    let mut rig = with_guest(Acceptance::default());
+fn a_broadcast_by_which_a_component_appears_is_passed_on_though_the_other_side_has_its_id() {
+    let mut rig = with_bridge(Acceptance::default());
     rig.hear(&Frame {
         destination: JausId::EVERYONE,
         ..numbered(500)
@@ -80,8 +80,8 @@ fn a_broadcast_by_which_a_component_appears_is_passed_on_though_a_guest_has_its_
 }
 
 #[test]
-fn a_copy_of_a_guests_own_message_from_another_bridge_shows_no_component() {
-    let mut rig = with_guest(Acceptance::default());
+fn a_copy_of_a_bridged_message_from_another_bridge_shows_no_component() {
+    let mut rig = with_bridge(Acceptance::default());
     rig.hear(&numbered(1));
     assert_eq!(rig.endpoint.route(PEER).unwrap().0, abroad());
     hear_abroad(&mut rig, 2);
@@ -91,7 +91,7 @@ fn a_copy_of_a_guests_own_message_from_another_bridge_shows_no_component() {
 #[test]
 fn an_id_with_rights_on_the_other_side_stays_there() {
     let accept = Acceptance::new(["42 control=127".parse().unwrap()]);
-    let mut rig = with_guest(accept);
+    let mut rig = with_bridge(accept);
     rig.hear(&numbered(500));
     assert_eq!(rig.endpoint.route(PEER).unwrap().0, abroad());
     hear_abroad(&mut rig, 2);
